@@ -120,6 +120,18 @@ def test_a_modulated_force_is_that_of_one_actuator_times_another_channel(otter):
     assert len(found) == 6
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_command_of_a_twin_is_an_actuator_s_own(otter, noise):
+    """But for noise, with which a log may have both."""
+    model, _, (w,) = otter
+    rng = np.random.default_rng(1)
+    port, starboard = (w.run.commands[:, [0]] * (1.0 + noise * rng.standard_normal((len(w.run.time), 1))) for _ in "ab")  # fmt: skip
+    twins = w.commanded_as(w.run.with_given(np.hstack([port, starboard])))
+    found = [name for name, _ in modulated_forces([twins], model)]
+    assert len(found) == 4
+    assert all(name.endswith(("|v|", "|r|")) for name in found)
+
+
 def test_without_commands_of_actuators_there_is_no_modulated_force(otter):
     model, _, (w,) = otter
     for run in (replace(w.run, commands=None), replace(w.run, signals=("a", "b"))):

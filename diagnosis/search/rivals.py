@@ -31,6 +31,7 @@ from fmus.actuators.actuation import actuators
 from fmus.effects import Effect
 
 from ..predictors import Model, WeakWindows
+from ..runs.run_constants import NEGLIGIBLE
 from .candidates import model_error
 from .most_likely import ridge
 
@@ -110,7 +111,8 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
     """Forces of actuators in proportion to the size of a channel that no effect has: name, (K, 3).
 
     Such channels are the commands of the other actuators, the speed aside and the yaw rate, averaged
-    over windows. Of runs with the commanded force alone, or with different commands, there are none.
+    over windows. Of runs with the commanded force alone, or with different commands, there are none; nor
+    are the commands of a twin, which are the actuator's own.
 
     Args:
         data: windows of every run.
@@ -131,10 +133,21 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
         if not lost.any():
             continue
         others = {name: k for k, name in enumerate(signals) if k not in own}
-        sizes = np.concatenate([_sizes(w, [*others.values()]) for w in data])
-        for name, size in zip((*others, "|v|", "|r|"), sizes.T, strict=True):
-            if size.any():
+        sizes = np.concatenate([_sizes(w, [*others.values(), *own]) for w in data]).T
+        its = sizes[len(others) : len(others) + len(own)]
+        named = dict(zip(others, sizes, strict=False)) | dict(
+            zip(("|v|", "|r|"), sizes[-2:], strict=True)
+        )
+        for name, size in named.items():
+            if size.any() and not any(_alike(size, x) for x in its):
                 yield f"the force of the {a.part.title} in proportion to {name}", lost * size[:, None]
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether all but a negligible part of a channel (K,) is in proportion to another one."""
+    return (
+        float(one @ other) ** 2 >= (1.0 - NEGLIGIBLE**2) * float(one @ one) * float(other @ other) > 0.0
+    )
 
 
 def _sizes(w: WeakWindows, commands: Sequence[int]) -> np.ndarray:

@@ -5,7 +5,7 @@ from ..ops import Number, fmax, where
 from .curve import NODES, interpolate, node_parameters
 from .devices import SHARE, Devices, by_command, changed, declared, parameter
 from .effect import Effect, Running, Search, Thrust
-from .text import Found, peak, percent, reach, towards
+from .text import Found, peak, percent, reach, signed, towards
 
 # Shares of the full command: closer where a small one matters.
 COMMAND_DEADBANDS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
@@ -58,8 +58,8 @@ def command_curve(d: Devices, command: str) -> Effect:
         at, value = peak(f)
         return (
             f"The force of the {d.title} over the command differs from the model, most by "
-            f"{percent(value)} {'less' if value < 0.0 else 'more'} force at {percent(2.0 * at - 1.0)} "
-            f"of full {'ahead' if at >= 0.5 else 'astern'}."
+            f"{percent(value)} {'less' if value < 0.0 else 'more'} force at "
+            f"{signed(100.0 * (2.0 * at - 1.0))} % of the largest {command}."
         )
 
     @declared(
