@@ -37,7 +37,6 @@ from diagnosis.search.prediction_fit.refit import (
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
 from fmus.scale import REFERENCE
-from fmus.vessel import vessel
 
 STEPS = {
     "N_r": 1e-3,
@@ -544,16 +543,6 @@ def test_run_without_a_push_tells_of_none():
     ]
     assert not any(f.stretches for f in found)
     assert "No disturbance" in found[0].sentence
-
-
-def test_states_of_runs_stand_side_by_side_though_parameters_move_one_of_them_alone():
-    """Three models in a run of four windows, one in a run of two: what does not move there is the same."""
-    moved = vessel.State._make(np.arange(12.0).reshape(3, 4) + k for k in range(7))
-    still = vessel.State._make(np.full((1, 2), 10.0 + k) for k in range(7))
-    both = shooting._beside([moved, still])
-    assert {x.shape for x in both} == {(3, 6)}
-    np.testing.assert_array_equal(both.u[:, :4], moved.u)
-    assert (both.u[:, 4:] == still.u).all()
 
 
 @pytest.mark.parametrize(
