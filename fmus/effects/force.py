@@ -98,6 +98,7 @@ def change(coefficient: Variable) -> Effect:
         parameters=(delta,),
         gives=coefficient.name,
         adds_to={delta.name: (coefficient.name,)},
+        search=Search(of_each_run=name == "X_|u|u"),  # a hull is fouled, or cleaned
         wording=Wording(damping_sentence, FAMILY.get(name, UNKNOWN), APART.get(name, {})),
     )
     def force(ship: Motion, delta: Number) -> Triple:
