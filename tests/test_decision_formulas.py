@@ -113,11 +113,38 @@ def test_a_damping_that_differs_from_place_to_place_repeats_with_both_together(e
         ),
         smooth=np.eye(n),
         held=np.eye(n),
-        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one"),
+        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one", commands=None),
     )
     left = np.zeros((n, 3))
     left[:, 0] = error(x, u)
     assert recurrences.recurrence([w], left)[0].best == best
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_force_by_the_commands_of_two_actuators_repeats_with_these(known):
+    """A jet takes force from the actuator behind it, of which the sum of both forces tells nothing."""
+    n, rng = 900, np.random.default_rng(1)
+    slow = np.cumsum(rng.standard_normal((n, 2)), axis=0)
+    orders = np.sin(0.3 * slow)
+    w = SimpleNamespace(
+        middle=0.5 * np.arange(n),
+        every=0.5,
+        scale=REFERENCE,
+        known=np.ones(n, bool),
+        smoothed=SimpleNamespace(eta=np.zeros((n, 3)), nu=np.zeros((n, 3))),
+        smooth=np.eye(n),
+        held=np.eye(n),
+        run=SimpleNamespace(
+            tau_cmd=np.ones((n, 3)),
+            name="one",
+            commands=orders if known else None,
+            given=orders,
+            signals=("a.n", "b.n"),
+        ),
+    )
+    left = np.zeros((n, 3))
+    left[:, 0] = orders[:, 0] * orders[:, 1]
+    assert recurrences.recurrence([w], left)[0].best == ("command" if known else None)
 
 
 def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypatch):
@@ -133,7 +160,7 @@ def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypat
         smoothed=SimpleNamespace(eta=rng.standard_normal((n, 3)), nu=rng.standard_normal((n, 3))),
         smooth=np.eye(n),
         held=np.eye(n),
-        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one"),
+        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one", commands=None),
     )
     recurrences.recurrence([w], rng.standard_normal((n, 3)))
     assert all(np.unique(at).size > 20 for at in offsets)
