@@ -170,14 +170,8 @@ def alike_in_all_runs(
     parameters = dict.fromkeys(parameter_and_run(n)[0] for n in p.names)
     if len(parameters) == len(p.names) or any(timed(ship, n) for n in p.names):
         return at, p
-    of_all = {
-        n: float(
-            np.mean(
-                [x for of, x in at.values.items() if of in p.names and parameter_and_run(of)[0] == n]
-            )
-        )
-        for n in parameters
-    }
+    each = {n: [at.values[x] for x in p.names if parameter_and_run(x)[0] == n] for n in parameters}
+    of_all = {n: float(np.mean(values)) for n, values in each.items()}
     beside = at.without(p.names)
     begin = CandidateStart(of_all, [*of_all], np.zeros((len(of_all), len(of_all))))
     found = refine(t, beside, nuisance_of(t, beside, t.error(beside)), begin).estimate
