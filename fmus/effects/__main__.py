@@ -24,6 +24,9 @@ prints this page.
 | id | kind | axis | formula | symbol | parameters [unit] | sign | source |
 |---|---|---|---|---|---|---|---|
 """
+OF_EACH_RUN = """
+The values of these may differ from run to run, as weather, load, fouling and sensors do: {}.
+"""
 
 
 def _cell(text: str) -> str:
@@ -66,7 +69,8 @@ def table(effects: EffectSet) -> str:
         )
         for e in sorted(effects.values(), key=lambda e: ORDER.index(e.kind))
     ]
-    return HEAD + "\n".join(rows) + "\n"
+    of_each_run = (f"`{e.id}`" for e in effects.values() if e.search.of_each_run)
+    return HEAD + "\n".join(rows) + "\n" + OF_EACH_RUN.format(", ".join(of_each_run))
 
 
 ORDER = ["force", "inertia", "actuator", "environment", "measurement"]
