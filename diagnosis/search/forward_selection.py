@@ -6,11 +6,14 @@ model then takes the effect in, so that the next step starts from a model that i
 found is refined along with each candidate. With a second effect in, each effect is searched again, and
 removed if nothing brings in its place what an effect must bring.
 
+Values of each run explain more than one for all, and foretell nothing of other runs: they stand back
+where an effect with one value foretells runs that it has not seen better.
+
 One of two causes, alone, may well do harm where the other acts most: an effect that explains much and
 harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -55,7 +58,7 @@ from .shortlist import (
     reweighted,
     scored_alone,
 )
-from .significance import better, beyond_chance, harmful, matters
+from .significance import better, beyond_chance, harmful, matters, worse
 
 
 class ForwardSelection:
@@ -106,7 +109,7 @@ def search(
     t, at = TrainingSet(data, None, belief), RefinedModel.at(start, belief)
     advance("every effect as a candidate")
     made: MadeCandidates = {}
-    ranking = rank(t, at, set(), made)
+    ranking = rank(t, at, set(), made, of_each_run=True)
     lacking, command = ranking.base, commanded(data, start)
     shows = partial(matters, lacking, command=command)
     likely = likely_effects(ranking, start, shows)
@@ -122,6 +125,9 @@ def search(
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
             break
         t, ranking, best = weighed
+        if foretold_by_others(best):
+            alike = rank(t, at, gone | {p.id for p in accepted}, made)
+            t, ranking, best = reweighted(t, at, alike) or weighed
         total = float(np.sum((lacking * t.weight) ** 2))
         first = best.scored[0]
         without = best.winner.without(best.starts[first.candidate].values)
@@ -144,7 +150,7 @@ def search(
             gone |= removed
         turn = f"effect {len(accepted) + 1}"
         advance(f"{turn}: every effect as a candidate")
-        ranking = rank(t, at, gone | {p.id for p in accepted}, made)
+        ranking = rank(t, at, gone | {p.id for p in accepted}, made, of_each_run=True)
         if likely > len(accepted):
             likely = min(likely, len(accepted) + likely_effects(ranking, start, shows))
         turn = f"{turn}, about {likely} likely"
@@ -159,6 +165,23 @@ def search(
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
 
 
+def has_values_of_runs(ship: Ship, names: Iterable[str]) -> bool:
+    """Whether parameters of an effect have values of each run, and are not only times of a failure."""
+    return any(parameter_and_run(n)[1] and timed(ship, n) is None for n in names)
+
+
+def foretold_by_others(best: Shortlist) -> bool:
+    """Whether the first has values of each run, and one with one value foretells unseen runs better."""
+    first, *others = best.scored
+    of_runs = [
+        has_values_of_runs(best.winner.start.ship, best.starts[s.candidate].values) for s in best.scored
+    ]
+    return of_runs[0] and any(
+        not alone and worse(first.runs, s.runs, first.prior - s.prior)
+        for s, alone in zip(others, of_runs[1:], strict=True)
+    )
+
+
 def alike_in_all_runs(
     t: TrainingSet, at: RefinedModel, p: AcceptedEffect
 ) -> tuple[RefinedModel, AcceptedEffect]:
@@ -166,10 +189,9 @@ def alike_in_all_runs(
 
     When it was accepted other effects and coefficients were still wrong, and differ between runs.
     """
-    ship = at.start.ship
-    parameters = dict.fromkeys(parameter_and_run(n)[0] for n in p.names)
-    if len(parameters) == len(p.names) or any(timed(ship, n) for n in p.names):
+    if not has_values_of_runs(at.start.ship, p.names):
         return at, p
+    parameters = dict.fromkeys(parameter_and_run(n)[0] for n in p.names)
     each = {n: [at.values[x] for x in p.names if parameter_and_run(x)[0] == n] for n in parameters}
     of_all = {n: float(np.mean(values)) for n, values in each.items()}
     beside = at.without(p.names)
@@ -210,7 +232,8 @@ def searched_again(
         nuisance = nuisance_of(t, beside, t.error(beside))
         beside = refit(t, beside, nuisance).estimate
         nuisance = replace(nuisance, offset=beside.theta(beside.fitted))
-        ranking = rank(t, beside, {p.id for p in others}, made, nuisance)
+        of_runs = has_values_of_runs(at.start.ship, found[k].names)
+        ranking = rank(t, beside, {p.id for p in others}, made, nuisance, of_runs)
         if leads(t, ranking, found[k].id):
             continue
         weighed = reweighted(t, beside, ranking, found[k].id)

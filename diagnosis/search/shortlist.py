@@ -43,8 +43,9 @@ CHANGED = 1.5  # 1, ratio of an axis' weight from which on candidates are refine
 NEW = 10.0
 TIE = 2.0  # 1, paired standard errors within which two candidates are indistinguishable; contract
 
-# By the effects of the measurement in the model, the candidates by id.
-MadeCandidates = dict[frozenset[str], dict[str, Candidate]]
+# By the effects of the measurement in the model, and whether values of each run are tried, the
+# candidates by id.
+MadeCandidates = dict[tuple[frozenset[str], bool], dict[str, Candidate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +78,7 @@ def rank(
     known: Set[str],
     made: MadeCandidates | None = None,
     nuisance: Nuisance | None = None,
+    of_each_run: bool = False,
 ) -> Ranking:
     """Score every effect that is not known yet.
 
@@ -87,16 +89,17 @@ def rank(
         made: candidates of earlier rankings, which serve where the measurement is the same; receives
             those of this one. None: there are none.
         nuisance: what is fitted along, by slopes nearby; None: not known.
+        of_each_run: whether values may be others in each run.
     """
     model = at.model(t.prior)
     base = model_error(t.data, model)
     measured = frozenset(i for i in known if model.ship.effects[i].kind == "measurement")
     made = {} if made is None else made
-    earlier = made.get(measured, {})
-    found = candidates(t.data, model, base, known, earlier)
+    earlier = made.get((measured, of_each_run), {})
+    found = candidates(t.data, model, base, known, earlier, of_each_run)
     if sum(s.columns.nbytes for c in found for s in c.shapes) > ROOM * len(t.data):
         made.clear()  # of a long run there is no room for two
-    made[measured] = earlier | {c.effect.id: c for c in found if lasts(c.effect, model)}
+    made[measured, of_each_run] = earlier | {c.effect.id: c for c in found if lasts(c.effect, model)}
     nuisance = nuisance_of(t, at, base) if nuisance is None else nuisance
     linear = [s.columns for c in found for s in c.shapes[:1]]
     floor = FLOOR * model.ship.scale.forces

@@ -340,7 +340,7 @@ class FakeModel:
 def search_places(monkeypatch, scores, accepted):
     """The places searched again of single-letter effects, where scores tell how good each set of them is."""
 
-    def rank(t, beside, others, made, nuisance):
+    def rank(t, beside, others, made, nuisance, *_):
         assert others == beside.effects
         return SimpleNamespace(nuisance=nuisance, beside=beside)
 

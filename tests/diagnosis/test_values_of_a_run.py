@@ -1,5 +1,7 @@
 """Values that hold in one run alone, such as the current of its day."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.planted import voyages
@@ -11,7 +13,8 @@ from diagnosis.predictors.prediction import stacked
 from diagnosis.predictors.ship_model import of_run, parameter_and_run
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.search.candidates import candidate, changed_error, model_error
-from diagnosis.search.forward_selection import ForwardSelection
+from diagnosis.search.forward_selection import ForwardSelection, foretold_by_others
+from diagnosis.search.map_regression import Scored
 
 NORTH, WEST = {"V_n": 0.06}, {"V_e": -0.06}  # m/s
 START = Model()
@@ -80,15 +83,16 @@ def test_a_current_of_one_run_changes_the_error_of_that_run_as_one_of_all_does(d
 def test_a_current_is_tried_for_all_runs_and_for_each(data):
     e = START.ship.effects["current"]
     base = model_error(data, START)
-    of_all, of_each = candidate(data, START, base, e).shapes
+    assert len(candidate(data, START, base, e).shapes) == 1
+    of_all, of_each = candidate(data, START, base, e, True).shapes
     assert [parameter_and_run(n) for n in of_each.fitted] == [
         (n, run) for run in ("run0", "run1") for n in ("V_n", "V_e")
     ]
     assert of_each.columns[..., :2] + of_each.columns[..., 2:] == pytest.approx(of_all.columns)
-    alone = candidate(data[:1], START, base[: data[0].middle.size], e).shapes
+    alone = candidate(data[:1], START, base[: data[0].middle.size], e, True).shapes
     assert len(alone) == 1, "of one run both are the same"
     drag = START.ship.effects["X_u"]
-    assert len(candidate(data, START, base, drag).shapes) == 1
+    assert len(candidate(data, START, base, drag, True).shapes) == 1
 
 
 def test_predictions_and_their_slopes_are_those_of_the_current_of_their_run(data):
@@ -123,3 +127,28 @@ def test_a_current_is_found_of_each_run_where_it_differs(other):
         for name in ("V_n", "V_e"):
             got = found.model.during(run).value(name)
             assert got == pytest.approx(current.get(name, 0.0), abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "losses", "stands_back"),
+    [
+        ("V_n@a", "delta_X_u", (2.0, 1.0), True),
+        ("V_n@a", "delta_X_u", (1.0, 1.0), False),  # it foretells as much
+        ("V_n@a", "mass@a", (2.0, 1.0), False),  # nor does the other have one value
+        ("V_n", "delta_X_u", (2.0, 1.0), False),
+        ("bow_failure_time@a", "delta_X_u", (2.0, 1.0), False),  # a time is always of a run
+    ],
+)
+def test_values_of_each_run_stand_back_where_one_value_foretells_unseen_runs(
+    first, second, losses, stands_back
+):
+    noise = np.random.default_rng(0).uniform(0.9, 1.1, (2, 40))
+    scored = [
+        Scored(k, 0, noise[k], size * noise[k], 0.0, 0.0) for k, size in zip((1, 0), losses, strict=True)
+    ]
+    best = SimpleNamespace(
+        winner=SimpleNamespace(start=START),
+        starts=[SimpleNamespace(values={second: 1.0}), SimpleNamespace(values={first: 1.0})],
+        scored=scored,
+    )
+    assert foretold_by_others(best) is stands_back
