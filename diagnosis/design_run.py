@@ -43,6 +43,7 @@ class Task(BaseModel):
     horizon: float | None = None
     anyway: bool = False
     measured_commands: bool = False
+    split: list[tuple[str, float]] = []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,6 +66,7 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     from .design import Question, plan_next
     from .design.designing import limits_of
     from .predictors import open_model, ship_of_model, ship_with
+    from .runs import cut, read_each
     from .verdict.measured_commands import with_measured_commands
 
     limits = limits_of(options.minutes, options.basin)
@@ -72,7 +74,8 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     start = open_model(task.model, ship=craft).start
     if start is None:
         return _advised(options, content, folder)
-    runs = gather(task.runs, advance, task.anyway, start, task.horizon)
+    parts = cut(read_each(task.runs, craft), task.split)
+    runs = gather(parts, advance, task.anyway, start, task.horizon)
     if task.measured_commands:
         runs = [with_measured_commands(w) for w in runs]
     q = Question(runs, content, start, task.prior, limits, options.criterion, task.ship)

@@ -91,6 +91,8 @@ def _calibrates_fmu(options: argparse.Namespace) -> bool:
 
 def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
     """The one answer where the parameters of an FMU are calibrated."""
+    if options.split:
+        raise InputError("--split is of no use here: a parameter of an FMU has one value for all runs")
     from .fmu_parameters.output.learn_fmu import learn_fmu
 
     origin = {name: str(value) for name, value in _origin(options).items()}
@@ -219,6 +221,7 @@ def _task(options: argparse.Namespace) -> dict[str, object]:
         "prior": options.prior,
         "horizon": options.horizon,
         "anyway": options.anyway,
+        "split": options.split,
     }
 
 

@@ -89,6 +89,24 @@ def test_speeds_that_are_reached_once_say_nothing_of_what_repeats():
     assert recurrences._share(error, near, np.zeros(0, int)) > 0.3
 
 
+def with_motion(eta, nu, orders=None, every=0.5):
+    """Windows of a run, one each sample, with a constant force, or also the orders of two actuators."""
+    n = len(eta)
+    run = SimpleNamespace(
+        tau_cmd=np.ones((n, 3)), name="one", commands=orders, signals=("a.n", "b.n"), given=orders
+    )
+    return SimpleNamespace(
+        middle=every * np.arange(n),
+        every=every,
+        scale=REFERENCE,
+        known=np.ones(n, bool),
+        smoothed=SimpleNamespace(eta=eta, nu=nu),
+        smooth=np.eye(n),
+        held=np.eye(n),
+        run=run,
+    )
+
+
 @pytest.mark.parametrize(
     ("error", "best"),
     [
@@ -103,18 +121,7 @@ def test_a_damping_that_differs_from_place_to_place_repeats_with_both_together(e
     slow = np.cumsum(rng.standard_normal((n, 2)), axis=0)
     x, u = np.sin(0.3 * slow[:, 0]), np.sin(0.3 * slow[:, 1])
     zero = np.zeros(n)
-    w = SimpleNamespace(
-        middle=0.5 * np.arange(n),
-        every=0.5,
-        scale=REFERENCE,
-        known=np.ones(n, bool),
-        smoothed=SimpleNamespace(
-            eta=np.column_stack([x, zero, zero]), nu=np.column_stack([u, zero, zero])
-        ),
-        smooth=np.eye(n),
-        held=np.eye(n),
-        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one", commands=None),
-    )
+    w = with_motion(np.column_stack([x, zero, zero]), np.column_stack([u, zero, zero]))
     left = np.zeros((n, 3))
     left[:, 0] = error(x, u)
     assert recurrences.recurrence([w], left)[0].best == best
@@ -126,22 +133,7 @@ def test_a_force_by_the_commands_of_two_actuators_repeats_with_these(known):
     n, rng = 900, np.random.default_rng(1)
     slow = np.cumsum(rng.standard_normal((n, 2)), axis=0)
     orders = np.sin(0.3 * slow)
-    w = SimpleNamespace(
-        middle=0.5 * np.arange(n),
-        every=0.5,
-        scale=REFERENCE,
-        known=np.ones(n, bool),
-        smoothed=SimpleNamespace(eta=np.zeros((n, 3)), nu=np.zeros((n, 3))),
-        smooth=np.eye(n),
-        held=np.eye(n),
-        run=SimpleNamespace(
-            tau_cmd=np.ones((n, 3)),
-            name="one",
-            commands=orders if known else None,
-            given=orders,
-            signals=("a.n", "b.n"),
-        ),
-    )
+    w = with_motion(np.zeros((n, 3)), np.zeros((n, 3)), orders if known else None)
     left = np.zeros((n, 3))
     left[:, 0] = orders[:, 0] * orders[:, 1]
     assert recurrences.recurrence([w], left)[0].best == ("command" if known else None)
@@ -152,16 +144,7 @@ def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypat
     offsets = []
     monkeypatch.setattr(recurrences, "_share", lambda error, near, at, *_: offsets.append(at) or 0.0)
     rng, n = np.random.default_rng(0), 130
-    w = SimpleNamespace(
-        middle=np.arange(float(n)),
-        every=1.0,
-        scale=REFERENCE,
-        known=np.ones(n, bool),
-        smoothed=SimpleNamespace(eta=rng.standard_normal((n, 3)), nu=rng.standard_normal((n, 3))),
-        smooth=np.eye(n),
-        held=np.eye(n),
-        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one", commands=None),
-    )
+    w = with_motion(rng.standard_normal((n, 3)), rng.standard_normal((n, 3)), every=1.0)
     recurrences.recurrence([w], rng.standard_normal((n, 3)))
     assert all(np.unique(at).size > 20 for at in offsets)
 

@@ -26,7 +26,7 @@ from support.shared import once
 import diagnosis
 from cosim import InputError
 from cybership import scratch_folder
-from diagnosis import compare, learn, session
+from diagnosis import compare, design_run, learn, session
 from diagnosis.assessment.stability import OPERATING, least_dissipation
 from diagnosis.execution.result_folder import together
 from diagnosis.predictors import DescribedShip
@@ -443,6 +443,19 @@ def test_a_run_that_is_split_is_two_runs(runs, tmp_path):
     assert code == 0
     errors = strict(tmp_path / "out" / learn.COMPARISON)["errors"]
     assert [each["run"] for each in errors] == ["a until 40 s", "a from 40 s"]
+
+
+def test_a_split_run_is_split_again_by_what_reads_its_result(runs, tmp_path):
+    options = learn._parser().parse_args([str(runs / "a.csv"), "--split", "a@40"])
+    task = tmp_path / "posterior.json"
+    task.write_text(json.dumps({"task": learn._task(options)}))
+    assert design_run._task(task).split == [("a", 40.0)]
+
+
+def test_a_split_is_refused_where_the_parameters_of_an_fmu_are_calibrated(capfd):
+    given = ["run.csv", "--model", "a.fmu", "--parameters", "p.json", "--split", "run@40"]
+    assert learn.main(given) == 2
+    assert "a parameter of an FMU has one value for all runs" in " ".join(capfd.readouterr().err.split())
 
 
 def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):

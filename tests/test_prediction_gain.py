@@ -179,7 +179,7 @@ def test_coefficients_suffice_within_their_priors_where_nothing_is_left(
     monkeypatch.setattr(coefficients, "remains", lambda *_: left)
     its = Findings(model=BETTER, moved={"X_u": z})
     end = Findings([Finding(effect, {}, {}, 0.5, [], 1.0, 1.0)], model=BETTER)
-    assert sufficient(its, end, SimpleNamespace(start=START, runs=[])) is suffices
+    assert sufficient(its, end, SimpleNamespace(start=START, runs=[], validate=())) is suffices
 
 
 def test_the_standard_error_is_paired_and_covers_the_difference():

@@ -22,7 +22,7 @@ from ..runs import Smoothed, idle
 from ..runs.cleaning import WIDTH
 from ..runs.run_constants import DIGITS, FAR_OFF
 from .filters import FilterStart
-from .ship_model import Model, of_run
+from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 from .traced.compiled_law import compiler
 from .traced.recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
@@ -286,19 +286,14 @@ def stacked(models: Sequence[Model]) -> Model:
 def merged(models: Sequence[Model], spread: Callable[[np.ndarray], np.ndarray]) -> Model:
     """Several models as one; of parameters that differ, the values (p,) are spread over an array."""
 
-    def together(each: Sequence[Mapping[str, float]], run: str = "") -> dict[str, Any]:
-        names = dict.fromkeys(name for values in each for name in values)
-        columns = {n: np.array([m.value(of_run(n, run) if run else n) for m in models]) for n in names}
+    def together(part: str) -> dict[str, Any]:
+        values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
+        names = dict.fromkeys(name for each in values for name in each)
+        of = models[0].ship.parameters[part]
+        columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
         return {n: spread(x) if np.ptp(x) else float(x[0]) for n, x in columns.items()}
 
-    runs = {
-        run: together([m.runs.get(run, {}) for m in models], run)
-        for run in dict.fromkeys(run for m in models for run in m.runs)
-    }
-    vessel, thrusters = (
-        together([getattr(m, part) for m in models]) for part in ("vessel", "thrusters")
-    )
-    return replace(models[0], vessel=vessel, thrusters=thrusters, runs=runs)
+    return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
 
 
 def singles(model: Model) -> list[Model]:

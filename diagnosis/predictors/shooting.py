@@ -132,6 +132,7 @@ class Shooting:
         return [(one, one.runs[0].track.run.name) for one in self._of_runs]
 
     def _part(self, own: np.ndarray, group: tuple[Smoothed, np.ndarray]) -> "Shooting":
+        """The windows of one run, of which ``own`` (w,) are true."""
         found = copy(self)
         found.runs, found.starts = (group[0],), replace(self.starts, runs=(group,))
         found.run, found.start = np.zeros(own.sum(), int), self.start[own]
@@ -243,10 +244,11 @@ def _together(parts: Sequence[Around]) -> Around:
     motions = [part.motion for part in parts]
     by_mass = [np.broadcast_to(m.by_mass, (len(m.slope), 1, 3, 3)) for m in motions]
     slope = np.concatenate([m.slope for m in motions])
-    residuals, slopes = (
-        np.concatenate(each) for each in zip(*((p.residuals, p.slopes) for p in parts), strict=True)
+    return Around(
+        np.concatenate([part.residuals for part in parts]),
+        np.concatenate([part.slopes for part in parts]),
+        Linear(slope, np.concatenate(by_mass), motions[0].every),
     )
-    return Around(residuals, slopes, Linear(slope, np.concatenate(by_mass), motions[0].every))
 
 
 def _squares(off: np.ndarray) -> np.ndarray:

@@ -334,6 +334,12 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     return force
 
 
+def common_commands(data: Sequence[WeakWindows]) -> tuple[str, ...]:
+    """Signals of the commands of actuators in all runs; none: runs have others, or the force alone."""
+    signals = {w.run.signals if w.run.commands is not None else () for w in data}
+    return signals.pop() if len(signals) == 1 else ()
+
+
 def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Velocity (n, 3) with which a ship's thrusters meet the water, at its pose and velocity (n, 3)."""
     s = vessel.State._make([*eta.T, *nu.T, w.run.time])

@@ -128,8 +128,8 @@ def _reported(
     effects = d.start.ship.effects
     effect = effects[f.id]
     # Of a coefficient the addition counts, of any other parameter of the effect its value.
-    added = {n: parameter_and_run(n)[0] in effect.coefficients for n in f.values}
-    present = {n: 0.0 if is_addition else d.start.value(n) for n, is_addition in added.items()}
+    own = effect.coefficients
+    present = {n: 0.0 if parameter_and_run(n)[0] in own else d.start.value(n) for n in f.values}
     values = {n: x + present[n] for n, x in f.values.items()}
     ci95 = {
         n: within_range(d.start, n, values[n], low + present[n], high + present[n])

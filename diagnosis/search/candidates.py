@@ -271,10 +271,8 @@ def scaled(
             yield from ({**others, name: value} for value in values if low <= value <= high)
 
 
-def candidate(
-    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, of_each_run: bool = False
-) -> Candidate:
-    """An effect's shapes on these data; ``of_each_run``: also those with values of each run."""
+def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect) -> Candidate:
+    """An effect's shapes on these data: with one value for all runs, then with values of each run."""
     shapes: list[CandidateShape] = []
     # By inertia, current and measurement the model error changes smoothly, but not linearly.
     hull = e.kind in ("force", "environment", "actuator") and e.linear
@@ -282,7 +280,7 @@ def candidate(
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
         shapes += [plain] if not e.search.smooth else curve(base, plain, e, model.ship.scale)
-    if of_each_run and e.search.of_each_run and len(data) > 1:
+    if e.search.of_each_run and len(data) > 1:
         own = [of_run(n, w.run.name) for w in data for n in e.fitted]
         shapes.append(shape(data, model, base, {}, own, step))
     if spread(e):
@@ -309,7 +307,6 @@ def candidates(
     base: np.ndarray,
     known: Set[str] = frozenset(),
     earlier: Mapping[str, Candidate] = MappingProxyType({}),
-    of_each_run: bool = False,
 ) -> list[Candidate]:
     """All effects that the ship can have and that a regression can find, but those that are known.
 
@@ -320,7 +317,6 @@ def candidates(
         model, base: the model so far and its error (K, 3).
         known: ids of the effects in it.
         earlier: candidates by id that stay as they are, see :func:`lasts`.
-        of_each_run: whether values may be others in each run.
     """
     ship = model.ship
     apart = ship.layouts[-1]
@@ -328,6 +324,6 @@ def candidates(
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
     possible = [e for e in effects if e.search.by == "regression" and (each or not e.apart)]
     new = [e for e in possible if e.id not in earlier]
-    found = for_each(lambda e: candidate(data, model, base, e, of_each_run), new, new)
+    found = for_each(lambda e: candidate(data, model, base, e), new, new)
     made = {**earlier, **dict(zip([e.id for e in new], found, strict=True))}
     return [c for c in (made[e.id] for e in possible) if c.shapes]

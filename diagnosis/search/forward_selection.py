@@ -13,12 +13,11 @@ One of two causes, alone, may well do harm where the other acts most: an effect 
 harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from fmus.ship import Ship
 
@@ -41,10 +40,10 @@ from .refinement import (
     RefinedModel,
     TrainingSet,
     bounded,
+    has_values_of_runs,
     nuisance_of,
     refine,
     refit,
-    timed,
 )
 from .shortlist import (
     LENGTH,
@@ -54,9 +53,11 @@ from .shortlist import (
     Shortlist,
     in_order,
     leads,
+    of_one_value,
     rank,
     reweighted,
     scored_alone,
+    weighted,
 )
 from .significance import better, beyond_chance, harmful, matters, worse
 
@@ -124,10 +125,11 @@ def search(
         if weighed is None:
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
             break
+        if foretold_by_others(weighed[2]):
+            of_all = of_one_value(ranking.candidates, start.ship)
+            alike = weighted(t, ranking.table.sigma, ranking.base, ranking.nuisance, of_all)
+            weighed = reweighted(t, at, alike) or weighed
         t, ranking, best = weighed
-        if foretold_by_others(best):
-            alike = rank(t, at, gone | {p.id for p in accepted}, made)
-            t, ranking, best = reweighted(t, at, alike) or weighed
         total = float(np.sum((lacking * t.weight) ** 2))
         first = best.scored[0]
         without = best.winner.without(best.starts[first.candidate].values)
@@ -165,11 +167,6 @@ def search(
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
 
 
-def has_values_of_runs(ship: Ship, names: Iterable[str]) -> bool:
-    """Whether parameters of an effect have values of each run, and are not only times of a failure."""
-    return any(parameter_and_run(n)[1] and timed(ship, n) is None for n in names)
-
-
 def foretold_by_others(best: Shortlist) -> bool:
     """Whether the first has values of each run, and one with one value foretells unseen runs better."""
     first, *others = best.scored
@@ -196,8 +193,8 @@ def alike_in_all_runs(
     of_all = {n: float(np.mean(values)) for n, values in each.items()}
     beside = at.without(p.names)
     begin = CandidateStart(of_all, [*of_all], np.zeros((len(of_all), len(of_all))))
-    found = refine(t, beside, nuisance_of(t, beside, t.error(beside)), begin).estimate
-    found = replace(found, precision=np.asarray(block_diag(found.precision, begin.precision)))
+    refined = refine(t, beside, nuisance_of(t, beside, t.error(beside)), begin)
+    found = refined.estimate.fitting(begin.precision)
     charge = charge_of(t.blocks[:, 0].size) * (len(p.names) - len(of_all))
     if scored_alone(t, found).score > scored_alone(t, at).score + charge:
         return at, p

@@ -110,6 +110,10 @@ class RefinedModel:
         kept = [k for k, n in enumerate(self.fitted) if n not in names]
         return replace(self, precision=self.precision[kept][:, kept], held=self.held | set(names))
 
+    def fitting(self, precision: np.ndarray) -> "RefinedModel":
+        """The estimate with the prior precision (p, p) of its last values, which are fitted now."""
+        return replace(self, precision=np.asarray(block_diag(self.precision, precision)))
+
     def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "RefinedModel":
         """The estimate with additions, effects' parameters within their range."""
         names = (*self.values, *values)
@@ -121,6 +125,11 @@ class RefinedModel:
 def timed(ship: Ship, name: str) -> Effect | None:
     """The effect of a ship that a value is a time within a run of; None: it is none."""
     return ship.effects.timed.get(parameter_and_run(name)[0])
+
+
+def has_values_of_runs(ship: Ship, names: Iterable[str]) -> bool:
+    """Whether parameters of an effect have values of each run, and are not only times of a failure."""
+    return any(parameter_and_run(n)[1] and timed(ship, n) is None for n in names)
 
 
 def bounded(start: Model, name: str, addition: float) -> float:

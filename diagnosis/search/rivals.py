@@ -31,6 +31,7 @@ from fmus.actuators.actuation import actuators
 from fmus.effects import Effect
 
 from ..predictors import Model, WeakWindows
+from ..predictors.weak_form import common_commands
 from ..runs.run_constants import NEGLIGIBLE
 from .candidates import model_error
 from .most_likely import ridge
@@ -118,8 +119,7 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
         data: windows of every run.
         model: of the ship, without the effect.
     """
-    signals = data[0].run.signals
-    if any(w.run.commands is None or w.run.signals != signals for w in data):
+    if not (signals := common_commands(data)):
         return
     base, ship = model_error(data, model), model.ship
     apart = len(signals) != len(ship.layouts[0].commands)

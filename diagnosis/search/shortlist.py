@@ -8,7 +8,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
+
+from fmus.ship import Ship
 
 from ..execution.parallel import for_each
 from ..predictors.uncertainty import FLOOR, independent
@@ -30,6 +31,7 @@ from .refinement import (
     RefinedModel,
     TrainingSet,
     as_shape,
+    has_values_of_runs,
     nuisance_of,
     refine,
     timed,
@@ -43,9 +45,8 @@ CHANGED = 1.5  # 1, ratio of an axis' weight from which on candidates are refine
 NEW = 10.0
 TIE = 2.0  # 1, paired standard errors within which two candidates are indistinguishable; contract
 
-# By the effects of the measurement in the model, and whether values of each run are tried, the
-# candidates by id.
-MadeCandidates = dict[tuple[frozenset[str], bool], dict[str, Candidate]]
+# By the effects of the measurement in the model, the candidates by id.
+MadeCandidates = dict[frozenset[str], dict[str, Candidate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +96,24 @@ def rank(
     base = model_error(t.data, model)
     measured = frozenset(i for i in known if model.ship.effects[i].kind == "measurement")
     made = {} if made is None else made
-    earlier = made.get((measured, of_each_run), {})
-    found = candidates(t.data, model, base, known, earlier, of_each_run)
+    earlier = made.get(measured, {})
+    found = candidates(t.data, model, base, known, earlier)
     if sum(s.columns.nbytes for c in found for s in c.shapes) > ROOM * len(t.data):
         made.clear()  # of a long run there is no room for two
-    made[measured, of_each_run] = earlier | {c.effect.id: c for c in found if lasts(c.effect, model)}
+    made[measured] = earlier | {c.effect.id: c for c in found if lasts(c.effect, model)}
     nuisance = nuisance_of(t, at, base) if nuisance is None else nuisance
     linear = [s.columns for c in found for s in c.shapes[:1]]
     floor = FLOOR * model.ship.scale.forces
     sigma = noise(base, np.concatenate([*linear, nuisance.columns], axis=2), floor)
+    found = found if of_each_run else of_one_value(found, model.ship)
     return weighted(t, sigma, base, nuisance, found)
+
+
+def of_one_value(found: Sequence[Candidate], ship: Ship) -> list[Candidate]:
+    """Candidates without their shapes that have values of each run."""
+    return [
+        replace(c, shapes=[s for s in c.shapes if not has_values_of_runs(ship, s.fitted)]) for c in found
+    ]
 
 
 def weighted(
@@ -172,9 +181,7 @@ class Shortlist:
     def of(self, chosen: int) -> RefinedModel:
         """The model with the candidate of a place in the order."""
         best = self.scored[chosen].candidate
-        estimate = self.refined[best].estimate
-        precision = block_diag(estimate.precision, self.starts[best].precision)
-        return replace(estimate, precision=np.asarray(precision))
+        return self.refined[best].estimate.fitting(self.starts[best].precision)
 
 
 def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking, present: str = "") -> Shortlist:

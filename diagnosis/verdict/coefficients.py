@@ -186,8 +186,10 @@ def sufficient(its: Findings, found: Findings | Model, data: ValidationData) -> 
 
     What the priors allow is no missing effect. Waves and failures at times of a run are none of theirs.
     """
-    if isinstance(found, Findings) and len(judgeable(found, data)) < len(found.effects):
-        return False
+    if isinstance(found, Findings):
+        judged = judgeable(found, data.start, bool(data.validate))
+        if len(judged) < len(found.effects):
+            return False
     return its.plausible and not remains(data.runs, data.start, its.model)
 
 

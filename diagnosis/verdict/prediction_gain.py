@@ -14,6 +14,7 @@ from ..search.findings import Finding, Findings
 from ..search.prior import NominalPrior
 from ..search.shortlist import TIE
 from ..search.significance import predicts_better, predicts_worse
+from .pruning import judgeable
 from .validation_data import ValidationData
 
 # Group of coefficients -> the kind of force that they make up with others.
@@ -150,9 +151,8 @@ def without_gain(
     if gain is None or gain.gained:
         return set()
     effects = start.ship.effects
-    foretold = [f for f in found.effects if not (f.of_runs and gain.of_other_runs)]
-    searches = ((f, effects[f.id].search) for f in foretold)
-    shown = [f for f, search in searches if search.by != "spectrum" and not search.times]
+    ids = judgeable(found, start, gain.of_other_runs)
+    shown = [f for f in found.effects if f.id in ids]
     if gain.over == "initial" or not shown:
         return {f.id for f in shown}
     base, kinds = model_error(runs, start), dict[str, list[str]]()

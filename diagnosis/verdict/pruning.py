@@ -55,7 +55,7 @@ def prune(
         The findings that are left, all else fitted anew, and the rejected effects.
     """
     start = data.start
-    by_data = judgeable(found, data)
+    by_data = judgeable(found, start, bool(data.validate))
     if not found.effects or not data.judges(found):
         return found, []
     sizes = {f.id: len(f.values) for f in found.effects}
@@ -86,14 +86,14 @@ def prune(
     return kept, gone
 
 
-def judgeable(found: Findings, data: ValidationData) -> list[str]:
-    """The effects that data can judge, by their ids.
+def judgeable(found: Findings, start: Model, of_other_runs: bool) -> list[str]:
+    """The effects that data can judge, by their ids; ``of_other_runs``: these are validation runs.
 
     Waves and failures are not: no model has waves, and the times of a failure are those of the run in
     which it was found. Nor are, by validation runs, values that hold in training runs alone.
     """
-    effects = data.start.ship.effects
-    search = {f.id: effects[f.id].search for f in found.effects if not (f.of_runs and data.validate)}
+    effects = start.ship.effects
+    search = {f.id: effects[f.id].search for f in found.effects if not (f.of_runs and of_other_runs)}
     return [i for i, s in search.items() if s.by == "regression" and not s.times]
 
 
@@ -177,7 +177,8 @@ def proven(found: Findings, data: ValidationData, harm: Harm) -> tuple[Findings,
     Returns:
         The findings that are left, all else fitted anew, and the effects that were taken out.
     """
-    start, data, by_data = data.start, data.of_other_runs, judgeable(found, data)
+    start, by_data = data.start, judgeable(found, data.start, bool(data.validate))
+    data = data.of_other_runs
     doubted = [f for f in found.effects if f.id in by_data and not confidence_of(f, start).is_finding]
     kept, gone = found, []
     while doubted and data.judges(kept):

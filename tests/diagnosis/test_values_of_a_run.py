@@ -9,12 +9,12 @@ from support.planted import voyages
 from diagnosis import Model
 from diagnosis.predictors import omega
 from diagnosis.predictors.parameter_set import read_model, write_model
-from diagnosis.predictors.prediction import stacked
 from diagnosis.predictors.ship_model import of_run, parameter_and_run
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.search.candidates import candidate, changed_error, model_error
 from diagnosis.search.forward_selection import ForwardSelection, foretold_by_others
 from diagnosis.search.map_regression import Scored
+from diagnosis.search.shortlist import of_one_value
 
 NORTH, WEST = {"V_n": 0.06}, {"V_e": -0.06}  # m/s
 START = Model()
@@ -56,17 +56,6 @@ def test_a_model_with_values_of_runs_is_read_as_it_was_written(tmp_path):
     assert found.vessel == model.vessel
 
 
-def test_stacked_models_keep_the_values_of_runs_of_each():
-    changed = [START.plus({n: x}) for n, x in OF_DAYS.items()]
-    both = stacked([START, *changed])
-    for k, each in enumerate((START, *changed)):
-        for run in ("run0", "run1"):
-            of = both.during(run)
-            for name, _ in map(parameter_and_run, OF_DAYS):
-                value = np.ravel(of.vessel.get(name, of.thrusters.get(name, 0.0)))
-                assert value[k if value.size > 1 else 0] == each.during(run).value(name)
-
-
 def test_a_current_of_one_run_changes_the_error_of_that_run_as_one_of_all_does(data):
     base, changed = model_error(data, START), START.plus({"V_n": 0.03})
     name = of_run("V_n", "run0")
@@ -83,16 +72,17 @@ def test_a_current_of_one_run_changes_the_error_of_that_run_as_one_of_all_does(d
 def test_a_current_is_tried_for_all_runs_and_for_each(data):
     e = START.ship.effects["current"]
     base = model_error(data, START)
-    assert len(candidate(data, START, base, e).shapes) == 1
-    of_all, of_each = candidate(data, START, base, e, True).shapes
+    of_all, of_each = candidate(data, START, base, e).shapes
+    (one,) = of_one_value([candidate(data, START, base, e)], START.ship)
+    assert [s.fitted for s in one.shapes] == [of_all.fitted]
     assert [parameter_and_run(n) for n in of_each.fitted] == [
         (n, run) for run in ("run0", "run1") for n in ("V_n", "V_e")
     ]
     assert of_each.columns[..., :2] + of_each.columns[..., 2:] == pytest.approx(of_all.columns)
-    alone = candidate(data[:1], START, base[: data[0].middle.size], e, True).shapes
+    alone = candidate(data[:1], START, base[: data[0].middle.size], e).shapes
     assert len(alone) == 1, "of one run both are the same"
     drag = START.ship.effects["X_u"]
-    assert len(candidate(data, START, base, drag, True).shapes) == 1
+    assert len(candidate(data, START, base, drag).shapes) == 1
 
 
 def test_predictions_and_their_slopes_are_those_of_the_current_of_their_run(data):

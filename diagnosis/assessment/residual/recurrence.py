@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 
 from ...predictors import WeakWindows
 from ...predictors.uncertainty import correlated_windows
-from ...predictors.weak_form import BLOCK
+from ...predictors.weak_form import BLOCK, common_commands
 from ..regions import numbered
 from ..settings import SETTINGS
 from .structural_change import STRETCH, moment_of_change
@@ -70,8 +70,10 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     }
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
-    orders = _orders(data)
-    by_orders = None if orders is None else _neighbours(_scaled(orders), run, time, apart, count)
+    by_orders = None
+    if common_commands(data):
+        orders = np.concatenate([w.held @ w.run.given for w in data])
+        by_orders = _neighbours(_scaled(orders), run, time, apart, count)
     at_a_place = np.hstack([_scaled(place), spaces["motion"]])
     together = _neighbours(at_a_place, run, time, apart, count)
     rng = np.random.default_rng(0)
@@ -111,16 +113,6 @@ def _of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.eta, w.smoothed.nu))
     ahead = w.smooth @ np.exp(1j * eta[:, 2])
     return w.smooth @ eta[:, :2], w.smooth @ nu, w.held @ w.run.tau_cmd, ahead / np.abs(ahead)
-
-
-def _orders(data: Sequence[WeakWindows]) -> np.ndarray | None:
-    """Means (K, k) over windows of the commands of all actuators; None: runs have others, or none."""
-    signals = {w.run.signals if w.run.commands is not None else () for w in data}
-    return (
-        np.concatenate([w.held @ w.run.given for w in data])
-        if len(signals) == 1 and all(signals)
-        else None
-    )
 
 
 def _scaled(x: np.ndarray) -> np.ndarray:

@@ -13,7 +13,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 
 from ...predictors.ship_model import parameter_and_run
@@ -64,8 +63,7 @@ def profiled(
     size = REACH * max(abs(present), SMALL * at.start.unit(name))
     low, high = (_end(trial, best.cost, present, present + k * size) for k in (-1.0, 1.0))
     own = [at.fitted.index(n) for n in p.names if n in at.fitted and n != name]
-    precision = np.asarray(block_diag(best.estimate.precision, at.precision[own][:, own]))
-    last = replace(best.estimate, precision=precision, held=at.held | {name})
+    last = replace(best.estimate.fitting(at.precision[own][:, own]), held=at.held | {name})
     return last, {name: (low - start, high - start)}
 
 
