@@ -15,6 +15,7 @@ from diagnosis.design.manoeuvre_library import LIBRARY, USUAL, PlanStep
 from diagnosis.design.order_library import ORDERS, USUAL_ORDERS
 from diagnosis.search import candidates
 from diagnosis.search.nonlinear import profile
+from diagnosis.search.refinement import RefinedModel
 from fmus.ops import wrap
 
 # Plans
@@ -159,6 +160,7 @@ class Estimate:
     precision: np.ndarray = field(default_factory=lambda: np.array([[2.0]]))
     fitted: tuple = ("other", "radius")
     held: frozenset = frozenset({"kept"})
+    fitting = RefinedModel.fitting
 
     def holding(self, names):
         return ("holding", names)
