@@ -37,7 +37,7 @@ from diagnosis.design import (
     sequence,
     write_run,
 )
-from diagnosis.predictors import ship_with
+from diagnosis.predictors import WeakWindows, ship_with
 from diagnosis.predictors.parameter_set import write_model
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.search.candidates import SMALL, model_error
@@ -69,7 +69,8 @@ SHIPS = {
     "otter": FirstRun("otter_zigzag", 100.0, (300.0, 300.0)),
     "kvlcc2": FirstRun("kvlcc2_zigzag", 150.0, (800.0, 800.0)),
 }
-KINDS = ("designed", "usual", "random", "d-optimal")
+DESIGNED, TWICE = "designed", "designed twice"  # where one designed run does not decide
+KINDS = (DESIGNED, "usual", "random", "d-optimal")
 PRIOR, NOISY = 0.1, "n4"  # 1, largest relative error of a coefficient; noise
 PAIRS = 20  # of random effects
 TRIES = 4  # sizes of an effect, each LESS of the one before, until the ship stays on its path
@@ -188,20 +189,20 @@ def simulated(content: Any, truth: Path, out: Path, seed: int) -> Path:
     return out
 
 
-def first_runs(cell: Cell, work: Path) -> tuple[Path, list]:
-    """The parameters of the true ship, and its first run.
+def first_runs(cell: Cell, work: Path, truth: Path) -> list[WeakWindows]:
+    """The first run of the true ship, of which the parameters are written.
 
     Raises:
         InputError: at no size the ship stays on its path.
     """
-    nominal, truth = work / "nominal.ssv", work / "truth.ssv"
+    nominal = work / "nominal.ssv"
     write_model(nominal, cell.start)
     pilot = diagnosis.load(cell.first_run(nominal, work / "pilot", noisy=False), model=cell.start)
     for tries in range(TRIES):
         write_model(truth, hidden_ship(cell, pilot, LESS**tries))
         with suppress(InputError):  # it leaves its path
             log = cell.first_run(truth, work / f"first_{tries}")
-            return truth, diagnosis.load(log, model=cell.start)
+            return diagnosis.load(log, model=cell.start)
     raise InputError("the ship leaves its path with effects of any size that was tried")
 
 
@@ -238,50 +239,84 @@ def chosen(d: Designer, k: Knowledge, kind: str, seed: int) -> Iterator[tuple[st
         yield kind, d.search(k, seed)
 
 
+@dataclass(frozen=True, eq=False)
+class FurtherRuns:
+    """The runs of a cell that the first one leaves open.
+
+    Attributes:
+        cell: the ship.
+        truth: parameters of the true ship.
+        work: a folder.
+    """
+
+    cell: Cell
+    truth: Path
+    work: Path
+
+    def row(self, kind: str, content: Mapping | None, **more: Any) -> dict[str, Any]:
+        """One row of the results."""
+        base = {"ship": self.cell.ship, "cell": self.cell.name, "seed": self.cell.seed, "kind": kind}
+        return base | ({} if content is None else judged(content, self.cell.effects)) | more
+
+    def of_kind(self, q: Question, kind: str) -> Iterator[tuple[dict[str, Any], Question]]:
+        """The row of each run of a kind, and what is asked after it."""
+        q = replace(q, criterion=kind if kind == "d-optimal" else q.criterion)
+        try:
+            d, k = prepared(q)
+            plans = [*chosen(d, k, kind, self.cell.seed)]
+        except InputError as error:
+            yield self.row(kind, None, result=f"failed: {error}"), q
+            return
+        for name, plan in plans:
+            try:
+                # A usual run is the one that is named, or none.
+                tries = {"tries": 1} if kind == "usual" else {}
+                run, _ = d.checked(k, plan, self.cell.seed, **tries)
+                sure = Rehearsal(q.data, d.space, k).sure([d.windows(run.motion)], self.cell.seed)
+                data = [*q.data, self._measured(d, run, f"{name}_{len(q.data)}", len(q.data))]
+                content = diagnosis.diagnose(data, prior=PRIOR, model=self.cell.start).content
+                eta = data[-1].smoothed.eta[data[-1].known]
+                margin = float(d.basin.margin(eta, d.outline).min())
+                found = self.row(name, content, sure=sure, margin=margin)
+                yield found, replace(q, data=data, content=content)
+            except InputError as error:
+                yield self.row(name, None, result=f"failed: {error}"), q
+
+    def _measured(self, d: Designer, run: ScoredPlan, name: str, number: int) -> WeakWindows:
+        """A planned run of the true ship."""
+        folder = self.work / name
+        folder.mkdir()
+        write_run(d, run, 1, folder, self.cell.ship)
+        seed = self.cell.seed + 1000 * number
+        log = simulated(folder / scenario_file(1), self.truth, folder / "log", seed)
+        return diagnosis.load(log, model=self.cell.start)[0]
+
+    def twice(self, found: dict[str, Any], q: Question) -> dict[str, Any]:
+        """The row after a second designed run, where one does not decide."""
+        if found["result"] == OPEN:
+            found, _ = next(self.of_kind(q, DESIGNED))
+        return found | {"kind": TWICE}
+
+
 def cell_rows(cell: Cell, kinds: Sequence[str], limits: Limits) -> Iterator[dict]:
     """The rows of a cell: after the first run, and, where that is open, after one of each kind."""
-    base = {"ship": cell.ship, "cell": cell.name, "seed": cell.seed}
-
-    def row(kind: str, content: Mapping, **more: float) -> dict:
-        return base | {"kind": kind} | judged(content, cell.effects) | more
-
     with TemporaryDirectory() as scratch:
-        work, start = Path(scratch), cell.start
+        further = FurtherRuns(cell, Path(scratch) / "truth.ssv", Path(scratch))
         try:
-            truth, data = first_runs(cell, work)
-            q = Question(data, {}, start, PRIOR, limits, ship=cell.ship)
-            q = replace(q, content=diagnosis.diagnose(data, prior=PRIOR, model=start).content)
+            data = first_runs(cell, further.work, further.truth)
+            content = diagnosis.diagnose(data, prior=PRIOR, model=cell.start).content
         except InputError as error:
-            yield base | {"kind": "first", "result": f"failed: {error}"}
+            yield further.row("first", None, result=f"failed: {error}")
             return
-        yield (first := row("first", q.content))
-        if first["confidence"] >= LEVEL or not (q.content["effects"] or q.content["possibilities"]):
+        yield (first := further.row("first", content))
+        if first["confidence"] >= LEVEL or not (content["effects"] or content["possibilities"]):
             return
+        q = Question(data, content, cell.start, PRIOR, limits, ship=cell.ship)
         for kind in kinds:
-            try:
-                criterion = kind if kind == "d-optimal" else q.criterion
-                d, k = prepared(replace(q, criterion=criterion))
-                rehearsal = Rehearsal(data, d.space, k)
-                plans = [*chosen(d, k, kind, cell.seed)]
-            except InputError as error:
-                yield base | {"kind": kind, "result": f"failed: {error}"}
-                continue
-            for name, plan in plans:
-                try:
-                    # A usual run is the one that is named, or none.
-                    run, _ = d.checked(k, plan, cell.seed, **({"tries": 1} if kind == "usual" else {}))
-                    sure = rehearsal.sure([d.windows(run.motion)], cell.seed)
-                    target = work / name
-                    target.mkdir()
-                    write_run(d, run, 1, target, cell.ship)
-                    log = simulated(target / scenario_file(1), truth, target / "log", cell.seed + 1000)
-                    both = [*data, *diagnosis.load(log, model=start)]
-                    content = diagnosis.diagnose(both, prior=PRIOR, model=start).content
-                    eta = both[-1].smoothed.eta[both[-1].known]
-                    margin = float(d.basin.margin(eta, d.outline).min())
-                    yield row(name, content, sure=sure, margin=margin)
-                except InputError as error:
-                    yield base | {"kind": name, "result": f"failed: {error}"}
+            for found, after in further.of_kind(q, kind):
+                yield found
+                if kind == DESIGNED:
+                    yield further.twice(found, after)
 
 
 def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dict]:
@@ -294,7 +329,7 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
         base = {"ship": ship, "cell": cell.name, "seed": seed}
         with TemporaryDirectory() as scratch:
             try:
-                _, data = first_runs(cell, Path(scratch))
+                data = first_runs(cell, Path(scratch), Path(scratch) / "truth.ssv")
                 q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
                 d, k = prepared(q)
                 run, spread = d.checked(k, d.search(k, seed, points=BRIEF, evolved=0), seed)
