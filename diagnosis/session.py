@@ -36,6 +36,7 @@ from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
+from .search.prediction_fit.other_runs import with_other_runs
 from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
@@ -348,7 +349,8 @@ class Session(ShortRepr):
         self, verdict: DecidedFindings, region: OperatingRegion, gain: PredictionGain | None
     ) -> Diagnosis:
         """The diagnosis by a verdict: errors and bands of predictions, and whether it is stable."""
-        learned = verdict.learned.model
+        learned, posterior = with_other_runs(verdict.learned.model, verdict.posterior)
+        verdict = replace(verdict, learned=replace(verdict.learned, model=learned), posterior=posterior)
         found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
         of_validation = range(len(self.train), len(self.train) + len(self.validate))
         evaluations = [

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from support.measured import sail, smoothed
 from diagnosis import Comparison, Model, evaluate_run
 from diagnosis.predictors import read_model, weak_windows
 from diagnosis.predictors.prediction import predict
+from diagnosis.predictors.ship_model import of_run
 from diagnosis.predictors.traced.prediction_component import prediction_component
 from diagnosis.report import ReportData, write_report
 from diagnosis.report.reported_effect import ReportedCoefficient
@@ -234,3 +236,20 @@ def test_a_term_that_a_calibration_added_is_ticked(data):
     (slider,) = choices["N_ur"].sliders
     assert choices["N_ur"].ticked
     assert (slider.before, slider.after) == (0.0, pytest.approx(0.3))
+
+
+def test_each_run_has_the_value_that_its_prediction_has_where_values_differ_by_run():
+    """Of a run without one it is that of other runs."""
+    own = {of_run("delta_X_absu_u", "a"): -2.0, of_run("delta_X_absu_u", "b"): -4.0}
+    learned = Model(vessel={"delta_X_absu_u": -2.5}).plus({n: x + 2.5 for n, x in own.items()})
+    of = SimpleNamespace(
+        runs=[SimpleNamespace(name=name) for name in "abc"],
+        learned=learned,
+        start=Model(),
+        diagnosis=SimpleNamespace(posterior=SimpleNamespace(std={})),
+        _movable=lambda sliders: ("", sliders),
+    )
+    of._slider = partial(MovableModel._slider, of)
+    effect = learned.ship.effects["X_|u|u"]
+    sliders = MovableModel._choice(of, effect, "found", {}, True).sliders
+    assert [(s.run, s.after) for s in sliders] == [(0, -2.0), (1, -4.0), (2, -2.5)]

@@ -39,7 +39,7 @@ def write_model(path: str | Path, model: Model) -> None:
     Nominal values are left out: the file of the nominal model is an empty set. No FMU has
     a parameter of the measurement system, such as the offset of its clock: it stands in an
     annotation, which :func:`read_model` knows, and of which ``cosim.run`` says that it has no effect.
-    Values that hold in one run alone stand in another, with the name of their run; those of the first
+    Values that hold in one run alone stand in another, with the name of their run; times of the first
     such run are parameters as well, of which ``cosim.run`` says whose they are.
 
     Args:
@@ -60,7 +60,8 @@ def write_model(path: str | Path, model: Model) -> None:
         for run, own in model.runs.items()
     }
     for part, own in next(iter(runs.values()), {}).items():
-        values[part] = {**own, **values[part]}
+        times = {name: told for name, told in own.items() if name in model.ship.effects.timed}
+        values[part] = {**times, **values[part]}
     beside = values.pop(MEASUREMENT)
     of_runs = (own for parts in runs.values() for own in parts.values())
     groups = (*values.values(), beside, *of_runs)

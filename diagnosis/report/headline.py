@@ -35,8 +35,8 @@ NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
 )
 OWN_VALUES = (
-    "Values that hold in one run alone are of that run where it is left out as a whole, and other runs "
-    "are predicted without them."
+    "Values that hold in one run alone are of that run where it is left out as a whole. Other runs are "
+    "predicted with the mean of these values, reduced by its uncertainty, and without times of failures."
 )
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
 CALIBRATION_GAINED_NOTHING = (

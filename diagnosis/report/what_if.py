@@ -267,9 +267,10 @@ class MovableModel:
     def _choice(self, effect: Effect, note: str, told: dict[str, float], in_model: bool) -> Choice:
         """An effect with its values: those of the model that has it, else those that are reported."""
         free = [p.name for p in effect.parameters if p.name not in effect.settings]
+        single = {p for own in self.learned.runs.values() for p in own}
         of_runs = [n for e in self.runs for p in free for n in [of_run(p, e.name)]
-                   if p in self.learned.runs.get(e.name, {})]  # fmt: skip
-        single = {parameter_and_run(n)[0] for n in of_runs}
+                   if p in self.learned.runs.get(e.name, {})
+                   or (p in single and self.learned.value(n) != self.start.value(n))]  # fmt: skip
         sliders = []
         for name in (*(n for n in free if n not in single), *of_runs):
             present = self.start.value(name)

@@ -1,0 +1,73 @@
+"""The values with which runs are predicted of which nothing was learned, where values differ by run."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...predictors import Model
+from ..refinement import timed
+from .joint_posterior import JointPosterior
+
+
+class OtherRuns(NamedTuple):
+    """What is known of a parameter in a run of which nothing was learned.
+
+    Attributes:
+        name: of the parameter.
+        addition: most likely difference to the value that holds in all runs.
+        variance: of this difference.
+    """
+
+    name: str
+    addition: float
+    variance: float
+
+
+def shrunk_mean(values: np.ndarray) -> float:
+    """The mean of values (k,) of single runs, shrunk towards zero by what of it is chance.
+
+    It has the variance s^2 / k, with s^2 that of the values: in proportion to the square of the mean, so
+    much of it is chance (positive-part estimator of James and Stein, Proc. 4th Berkeley Symp. 1, 1961).
+    """
+    mean, variance = float(values.mean()), float(values.var(ddof=1)) / values.size
+    return mean - variance / mean if mean * mean > variance else 0.0
+
+
+def differing_by_run(model: Model) -> Iterator[OtherRuns]:
+    """The parameters with values of several runs, but times within a run, which no other run has.
+
+    Weather has no usual side: its mean is zero.
+    """
+    weather = [e for e in model.ship.effects.values() if e.kind == "environment"]
+    for name in dict.fromkeys(n for values in model.runs.values() for n in values):
+        own = [of_run[name] for of_run in model.runs.values() if name in of_run]
+        if timed(model.ship, name) is None and len(own) > 1:
+            values = np.array(own) - model.value(name)
+            mean = 0.0 if any(name in e.coefficients for e in weather) else shrunk_mean(values)
+            variance = float(np.square(values - mean).sum()) / (values.size - 1)
+            yield OtherRuns(name, mean, variance)
+
+
+def with_other_runs(model: Model, posterior: JointPosterior) -> tuple[Model, JointPosterior]:
+    """A model with values for other runs where its own differ by run, and the posterior with these.
+
+    The runs that have values keep them.
+    """
+    names, units, mean = [*posterior.names], [*posterior.units], [*posterior.mean.tolist()]
+    covariance = posterior.covariance
+    for other in differing_by_run(model):
+        name = f"{model.owner(other.name)}.{other.name}"
+        value = model.value(other.name) + other.addition
+        model = replace(model.plus({other.name: other.addition}), origin=model.origin)
+        if name not in names:
+            names.append(name)
+            units.append(model.declared(other.name).unit)
+            mean.append(value)
+            covariance = np.pad(covariance, (0, 1))
+        k = names.index(name)
+        mean[k] = value
+        covariance = covariance.copy()
+        covariance[k, k] += other.variance
+    return model, JointPosterior(names, units, np.array(mean), covariance)
