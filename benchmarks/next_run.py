@@ -263,22 +263,22 @@ class FurtherRuns:
         q = replace(q, criterion=kind if kind == "d-optimal" else q.criterion)
         try:
             d, k = prepared(q)
-            plans = [*chosen(d, k, kind, self.cell.seed)]
+            found = [*chosen(d, k, kind, self.cell.seed)]
         except InputError as error:
             yield self.row(kind, None, result=f"failed: {error}"), q
             return
-        for name, plan in plans:
+        for name, plan in found:
             try:
-                # A usual run is the one that is named, or none.
-                tries = {"tries": 1} if kind == "usual" else {}
-                run, _ = d.checked(k, plan, self.cell.seed, **tries)
+                # A usual or random run is the one that is named, or none.
+                plans = [plan] if kind in ("usual", "random") else d.best(k, plan)
+                run, _ = d.checked(k, plans, self.cell.seed)
                 sure = Rehearsal(q.data, d.space, k).sure([d.windows(run.motion)], self.cell.seed)
                 data = [*q.data, self._measured(d, run, f"{name}_{len(q.data)}", len(q.data))]
                 content = diagnosis.diagnose(data, prior=PRIOR, model=self.cell.start).content
                 eta = data[-1].smoothed.eta[data[-1].known]
                 margin = float(d.basin.margin(eta, d.outline).min())
-                found = self.row(name, content, sure=sure, margin=margin)
-                yield found, replace(q, data=data, content=content)
+                result = self.row(name, content, sure=sure, margin=margin)
+                yield result, replace(q, data=data, content=content)
             except InputError as error:
                 yield self.row(name, None, result=f"failed: {error}"), q
 
@@ -332,7 +332,8 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
                 data = first_runs(cell, Path(scratch), Path(scratch) / "truth.ssv")
                 q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
                 d, k = prepared(q)
-                run, spread = d.checked(k, d.search(k, seed, points=BRIEF, evolved=0), seed)
+                plans = d.best(k, d.search(k, seed, points=BRIEF, evolved=0))
+                run, spread = d.checked(k, plans, seed)
                 fresh = d.spread(k, run, seed + 1)
             except InputError as error:
                 yield base | {"result": f"no design: {error}"}

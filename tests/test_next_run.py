@@ -55,6 +55,7 @@ from diagnosis.predictors.thrust import LONGEST_STEP
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.runs.cleaning import BRIEF
 from diagnosis.search.candidates import model_error
+from diagnosis.search.gram import Nuisance
 from diagnosis.search.prior import NominalPrior
 
 NUMBERS = DIMENSIONS - 2  # of a manoeuvre
@@ -345,6 +346,24 @@ def test_what_a_confidence_without_a_rival_leaves_open_is_no_candidate(question)
         assert any("listed candidate" in text for text in r.doubts) == (r.listed < 0.95)
 
 
+def test_an_effect_that_the_runs_do_not_excite_changes_no_other_one(rehearsed):
+    """Its force is zero in all of them; the diagnosis may have it all the same."""
+    r, *_ = rehearsed
+    h = r.k.hypotheses[0]
+    trial = RehearsedEffect.of(r.wide, r.measured, r.measured.y, h, h.ids[0])
+    known = trial.nuisance
+    idle = Nuisance(
+        np.concatenate([known.columns, np.zeros_like(known.columns[..., :1])], axis=2),
+        np.pad(known.precision, (0, 1)),
+        np.append(known.offset, 0.0),
+        np.append(known.unit, 1.0),
+    )
+    _, values, std = replace(trial, nuisance=idle).judged(r.measured.y)
+    _, expected, expected_std = trial.judged(r.measured.y)
+    assert values == pytest.approx(expected)
+    assert std == pytest.approx(expected_std)
+
+
 @pytest.mark.slow
 def test_the_trial_of_an_effect_is_that_of_the_search(question, rehearsed):
     """On the old runs alone a trial has the score differences and the evidence of the diagnosis."""
@@ -411,7 +430,7 @@ def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, m
     monkeypatch.setattr(spread_of, "followed", lost)
     assert np.sort(d.spread(k, s, 0).margin)[0] == -np.inf
     with pytest.raises(InputError, match="leaves the basin"):
-        d.checked(k, s, 0, tries=1)
+        d.checked(k, [s], 0)
 
 
 def test_hidden_ships_of_the_benchmark_have_the_size_that_is_drawn(question):

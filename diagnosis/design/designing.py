@@ -1,7 +1,7 @@
 """The search for the plan that discriminates best: Sobol points over the library, then evolution."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -44,8 +44,9 @@ SECONDS = 40.0  # s, of a search at the most; a design with its check takes at m
 EVOLVED = 160  # 1, points tried by evolution at the most; chosen: some ten seconds
 MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no good ones in its time
 FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
+Size = tuple[float, float]  # shares of the largest speeds and of the room
 # 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
-SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
+SMALLER: tuple[Size, ...] = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin or fewer minutes"
@@ -82,7 +83,7 @@ class ScoredPlan:
     """
 
     steps: Sequence[PlanStep]
-    size: tuple[float, float]
+    size: Size
     motion: PlannedMotion
     gram: np.ndarray
     excess: float
@@ -182,14 +183,12 @@ class Designer:
         """Usual runs of such a ship."""
         return USUAL if self.orders is None else USUAL_ORDERS
 
-    def motion(self, steps: Sequence[PlanStep], size: tuple[float, float], h: float) -> PlannedMotion:
+    def motion(self, steps: Sequence[PlanStep], size: Size, h: float) -> PlannedMotion:
         """The motion of a plan every h [s], at shares of the largest speeds and of the room."""
         (found,) = self._motions([steps], size, h)
         return found
 
-    def _motions(
-        self, plans: Sequence[Sequence[PlanStep]], size: tuple[float, float], h: float
-    ) -> list[PlannedMotion]:
+    def _motions(self, plans: Sequence[Sequence[PlanStep]], size: Size, h: float) -> list[PlannedMotion]:
         """The motion of each of several plans, see :meth:`motion`."""
         (pace, room), T = size, self.limits.seconds
         if self.orders is not None:
@@ -203,10 +202,12 @@ class Designer:
         (found,) = self.scored_all(k, [steps])
         return found
 
-    def scored_all(self, k: Knowledge, plans: Sequence[Sequence[PlanStep]]) -> list[ScoredPlan]:
-        """The same of several plans: each with the first size that keeps the limits, else the last."""
+    def scored_all(
+        self, k: Knowledge, plans: Sequence[Sequence[PlanStep]], sizes: Sequence[Size] = SMALLER
+    ) -> list[ScoredPlan]:
+        """Several plans, each with the first of some sizes that keeps the limits, else the last."""
         found: dict[int, ScoredPlan] = {}
-        for size in SMALLER:
+        for size in sizes:
             left = [n for n in range(len(plans)) if n not in found]
             motions = self._motions([plans[n] for n in left], size, BRIEF * self.scale) if left else []
             for n, motion in zip(left, motions, strict=True):
@@ -215,7 +216,7 @@ class Designer:
                     gram = self.space.gram([self.windows(motion)])
                     score = CRITERIA[self.criterion](k, gram)
                     found[n] = ScoredPlan(plans[n], size, motion, gram, excess, score)
-                elif size == SMALLER[-1]:
+                elif size == sizes[-1]:
                     none = np.zeros_like(k.G)
                     found[n] = ScoredPlan(plans[n], size, motion, none, excess, -1.0 - excess)
         self.tried += (each := [found[n] for n in range(len(plans))])
@@ -296,20 +297,38 @@ class Designer:
         self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 
-    def checked(
-        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = REFINED
-    ) -> tuple[ScoredPlan, Spread]:
-        """The plan, or else the best of those that were tried, that keeps the basin with its spread.
+    def best(self, k: Knowledge, found: ScoredPlan) -> list[ScoredPlan]:
+        """A plan, the best of the others that were tried, then usual runs, all within the limits."""
+
+        def in_order(plans: Iterable[ScoredPlan]) -> list[ScoredPlan]:
+            return sorted((s for s in plans if s.excess == 0.0), key=lambda s: -s.score)
+
+        others = in_order(s for s in self.tried if s is not found)
+        usual = in_order(self.usual(k, name) for name in self.usual_runs)
+        return [found, *others[: REFINED - 1], *usual]
+
+    def checked(self, k: Knowledge, plans: Iterable[ScoredPlan], seed: int) -> tuple[ScoredPlan, Spread]:
+        """The first of some plans that keeps the basin with its spread, and this spread.
+
+        Where the spread leaves the basin, the same plan is tried slower and in less room.
 
         Raises:
-            InputError: none of so many does.
+            InputError: none of them does.
         """
-        others = sorted((s for s in self.tried if s.excess == 0.0), key=lambda s: -s.score)
-        for s in [found, *(s for s in others if s is not found)][:tries]:
-            tracks = self.spread(k, s, seed)
-            if tracks.margin.min() > 0.0:
-                return s, tracks
+        for s in plans:
+            for smaller in self._smaller(k, s):
+                tracks = self.spread(k, smaller, seed)
+                if tracks.margin.min() > 0.0:
+                    return smaller, tracks
         raise InputError(NO_SPREAD)
+
+    def _smaller(self, k: Knowledge, s: ScoredPlan) -> Iterator[ScoredPlan]:
+        """A plan at its own size, then at each smaller one that keeps the limits."""
+        yield s
+        for size in SMALLER[SMALLER.index(s.size) + 1 :]:
+            (smaller,) = self.scored_all(k, [s.steps], [size])
+            if smaller.excess == 0.0:
+                yield smaller
 
     def inseparable(self, k: Knowledge) -> list[tuple[int, int]]:
         """Pairs that no plan tried so far separates, see :func:`.information.inseparable`."""

@@ -23,7 +23,7 @@ from ..search.effect_evidence import EffectEvidence, evidence, nearest_share
 from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
-from ..search.most_likely import LEVEL
+from ..search.most_likely import LEVEL, ridge
 from ..search.shortlist import LENGTH
 from ..verdict.confidence import Doubts, confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
@@ -212,8 +212,7 @@ class RehearsedEffect:
         force = A[..., own] @ fit.beta + (0.0 if s.offset is None else s.offset)
         seen = evidence(1.0, 1.0, force, A[..., fit.used] @ fit.left, self.rows.std, self.rows.blocks)
         H = table.total[np.ix_(r.use, r.use)] + r.precision
-        scale = 1.0 / np.sqrt(np.diag(H))
-        std = scale * np.sqrt(np.diag(np.linalg.pinv(H * np.outer(scale, scale))))
+        std = np.sqrt(np.diag(np.linalg.inv(H + ridge(H, table.unit[r.use]))))
         values, deviations = dict(s.given), {}
         for place, x, deviation in zip(own, fit.beta, std, strict=False):
             n = int(place) - 1 - len(given)
