@@ -91,6 +91,41 @@ def bands(covariance):
     return Bands(windows, np.array([0.0, 2.0, 4.0]), predicted, covariance)
 
 
+def test_a_sample_is_inside_a_band_by_the_squared_distance_in_its_covariance():
+    rng = np.random.default_rng(0)
+    roots = rng.standard_normal((3, 3))
+    covariance = roots @ roots.T
+    of = bands(np.broadcast_to(covariance, (2, 3, 3, 3)))
+    own = covariance[:2, :2]
+    limit = -2.0 * np.log(1.0 - 0.9)  # chi-square with two degrees of freedom
+    direction = rng.standard_normal((3, 2))
+    length = np.sqrt([limit / (d @ np.linalg.solve(own, d)) for d in direction])
+    heading = 1.6449 * np.sqrt(covariance[2, 2])  # 95 % quantile: 90 % between both ends
+    for factor, within in ((0.99, True), (1.01, False)):
+        residuals = np.column_stack([direction * length[:, None], np.full(3, heading)]) * factor
+        assert (of.inside(residuals, 0.9) == within).all()
+
+
+def test_a_prediction_that_diverges_is_in_no_band_and_its_heading_is_any():
+    """A drag that makes a ship unstable: one window of a training run diverged, and the report crashed."""
+    known = np.diag([1.0, 4.0, 0.01])
+    covariance = np.tile(known, (2, 3, 1, 1))
+    covariance[0, 1] = 1e40 * np.ones((3, 3))  # singular
+    covariance[0, 2] = np.nan
+    of = bands(covariance)
+    near = np.full((3, 3), 0.01)
+    assert of.inside(near, 0.9).tolist()[1] == [False, False]
+    assert of.inside(near, 0.9).tolist()[2] == [True, True]
+    assert 0.0 < of.coverage(near) < 1.0
+    low, high = of.headings(0, 0.9)
+    assert (high - low)[:2] == pytest.approx([2.0 * 1.6449 * 0.1, 2.0 * np.pi], rel=1e-4)
+    lines = of.ellipses(0, 0.9) - of.predicted[0, :, None, :2]
+    assert np.isnan(lines[2]).all()
+    scaled = lines[0] / np.sqrt([1.0, 4.0])
+    assert np.sum(scaled**2, axis=1) == pytest.approx(-2.0 * np.log(0.1))
+    assert np.isfinite(lines[1]).all()
+
+
 def test_bands_have_the_covariance_of_their_time_and_the_probability_of_their_level():
     for level in (0.5, 0.9, 0.99):
         for dof in (1, 2):

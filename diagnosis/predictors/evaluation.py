@@ -50,29 +50,41 @@ class Bands(ShortRepr):
         return (1.0 - share) * self.covariance[window, k] + share * self.covariance[window, k + 1]
 
     def inside(self, residuals: np.ndarray, level: float) -> np.ndarray:
-        """(samples, 2), whether position and heading lie within a band.
+        """(samples, 2), whether position and heading lie within a band; not where a prediction diverges.
 
         Args:
             residuals: (samples, 3), measured minus predicted pose, see :meth:`Windows.residuals`.
             level: probability of the band: of an ellipse about the position, an interval of heading.
         """
         V = self.at_samples
-        place = residuals[:, :2, None]
-        squares = np.swapaxes(place, 1, 2) @ np.linalg.solve(V[:, :2, :2], place)
-        position = squares[:, 0, 0] <= quantile(level, 2)
+        x, y, _ = residuals.T
+        xx, xy, yy = V[:, 0, 0], V[:, 0, 1], V[:, 1, 1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares, det = yy * x**2 - 2.0 * xy * x * y + xx * y**2, xx * yy - xy**2
+            position = squares <= quantile(level, 2) * det
         heading = residuals[:, 2] ** 2 <= quantile(level, 1) * V[:, 2, 2]
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
-        """(T, points, 2), closed lines about the predicted positions of a window [m]."""
+        """(T, points, 2), closed lines about the predicted positions of a window [m].
+
+        NaN where the prediction diverges.
+        """
         around = np.linspace(0.0, 2.0 * np.pi)
         circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
-        factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
+        V = self.covariance[window, :, :2, :2]
+        known = np.isfinite(V).all(axis=(1, 2))
+        squares, axes = np.linalg.eigh(np.where(known[:, None, None], V, 0.0))
+        lengths = np.where(known[:, None], np.sqrt(np.maximum(squares, 0.0)), np.nan)
+        factor = axes * lengths[:, None, :]
         return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
 
     def headings(self, window: int, level: float) -> np.ndarray:
-        """(2, T), lower and upper end of the band about the predicted heading of a window [rad]."""
-        reach = np.sqrt(quantile(level, 1) * self.covariance[window, :, 2, 2])
+        """(2, T), lower and upper end of the band about the predicted heading of a window [rad].
+
+        Half a turn to both sides is any heading.
+        """
+        reach = np.minimum(np.sqrt(quantile(level, 1) * self.covariance[window, :, 2, 2]), np.pi)
         return np.stack([-reach, reach]) + self.predicted[window, :, 2]
 
     def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:

@@ -37,6 +37,7 @@ from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
 from ..session import Diagnosis
+from .formatting import finite
 from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
@@ -201,7 +202,7 @@ class MovableModel:
             "inertia": self.learned.reference_mass.tolist(),
             "arrays": store.entries,
         }
-        head = json.dumps(header, allow_nan=False).encode()
+        head = json.dumps(finite(header), allow_nan=False).encode()
         allocation = component_module(program(allocation_component(self.learned)))
         run = self.runs[0].weak_windows.run
         balance = balance_component(self.learned, self.names, run, self._points)

@@ -57,7 +57,8 @@ function withArrays(run) {
   const { arrays } = bench;
   const [given, measured, track] = [run.given, run.measured, run.track].map((part) => part.map((k) => arrays[k]));
   const force = run.force && run.force.rows.length ? weighted(run.force) : null;
-  return placed({ ...run, given, measured, track, force, begin: arrays[run.begin] }, arrays[run.since]);
+  const after = run.after.map((error) => error ?? Infinity); // null: the learned model diverges
+  return placed({ ...run, after, given, measured, track, force, begin: arrays[run.begin] }, arrays[run.since]);
 }
 
 // A run with places of its samples among the steps, by the time [s] of each since its window began.

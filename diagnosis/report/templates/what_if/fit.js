@@ -41,7 +41,7 @@ function residuals(found, moved, units) {
 
 // Errors of the learned model in the training runs, by which residuals are divided.
 function trainingErrors() {
-  const errors = bench.runs.flatMap((run) => (run.train ? [run.after] : []));
+  const errors = bench.runs.flatMap((run) => (run.train && run.after.every(Number.isFinite) ? [run.after] : []));
   const [p, h] = [0, 1].map((j) => Math.sqrt(errors.reduce((sum, e) => sum + e[j] * e[j], 0) / errors.length) || 1);
   return [p / Math.SQRT2, p / Math.SQRT2, h];
 }
