@@ -1072,6 +1072,10 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
         assert mended(Findings(near), start, by_axis, squares, sure) == (doubted if mends else {})
     possible = [Confidence(0.3, 0.3)] * len(made)
     assert not mended(Findings(made), start, by_axis, squares, possible)
+    # On an axis without a force of the larger one, coefficients explain what that seems to.
+    apart = squares.copy()
+    apart[0] = 0.0
+    assert not mended(Findings(made), start, by_axis, apart, sure)
     # A possibility mends a finding as well, and has no confidence to lose.
     first = {i: share for i, share in doubted.items() if share < 1.0}
     assert mended(Findings(made), start, by_axis, squares, [sure[0], possible[1]]) == first

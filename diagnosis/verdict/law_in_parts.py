@@ -82,14 +82,15 @@ def mended(
         if not believed and _as_stated(small, found.model, start):
             continue
         for large, more, own, is_finding in judged:
-            shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE]
+            # Coefficients that are fitted with the larger one may explain an axis on which it has no force.
+            shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE and own[k] > 0.0]
             mending = {small.id, large.id} & of_measurement
             if not (shown and is_finding) or mending == {large.id}:
                 continue
             if believed:
                 shares[small.id] = 1.0
             if len(mending) != 1:
-                share = max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
+                share = max(float(square[k] / own[k]) for k in shown)
                 shares[large.id] = max(share, shares.get(large.id, 0.0))
     return shares
 
