@@ -144,7 +144,7 @@ def search(
         if harms and before is not None:
             break
         before = (t, alone) if harms else None
-        accepted.append(accepted_effect(best, rng, nothing))
+        accepted.append(accepted_effect(ranking, best, rng, nothing))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
@@ -245,12 +245,13 @@ def searched_again(
             continue
         chosen = better(found[k].id, best, at.start.ship)
         if chosen is not None:
-            taken = taken_over(accepted_effect(best, rng, nothing, chosen), found[k], at.start.ship)
+            taken = accepted_effect(ranking, best, rng, nothing, chosen)
+            taken = taken_over(taken, found[k], at.start.ship)
             found[k] = replace(taken, beside=[p.id for p in others])
             t, at = again, best.of(chosen)
             due = [(k + j) % len(found) for j in range(1, len(found))]
         elif found[k].id in (order := [best.ids[s.candidate] for s in best.scored]):
-            now = accepted_effect(best, rng, nothing, order.index(found[k].id))
+            now = accepted_effect(ranking, best, rng, nothing, order.index(found[k].id))
             found[k] = replace(found[k], weights=now.weights, nearest=now.nearest)
     return at, found, gone
 
@@ -261,15 +262,24 @@ def taken_over(new: AcceptedEffect, old: AcceptedEffect, ship: Ship) -> Accepted
     return replace(new, instead_of=tuple(sorted(had - {new.id})))
 
 
+def scored_by_id(ranking: Ranking, best: Shortlist) -> list[tuple[str, Scored]]:
+    """The scores of all candidates with their ids: those of the shortlist, as refined, then the others."""
+    refined = [(best.ids[s.candidate], s) for s in best.scored]
+    every = ((ranking.candidates[s.candidate].effect.id, s) for s in ranking.order)
+    return [*refined, *((name, s) for name, s in every if name not in best.ids)]
+
+
 def accepted_effect(
-    best: Shortlist, rng: np.random.Generator, nothing: Scored, chosen: int = 0
+    ranking: Ranking, best: Shortlist, rng: np.random.Generator, nothing: Scored, chosen: int = 0
 ) -> AcceptedEffect:
     """A candidate of a shortlist, by its place in the order, as an effect that was found.
 
-    ``nothing`` is the score without any.
+    Others that are not in the shortlist may be as good but for a single block. ``nothing`` is the score
+    without any.
     """
     first = best.scored[chosen].candidate
-    shares = first_share(best.scored, rng).tolist()
+    names, scored = zip(*scored_by_id(ranking, best), strict=True)
+    shares = first_share(scored, rng).tolist()
     losses = [float(s.blocks.sum()) for s in best.scored]
     own = losses.pop(chosen)
     nearest = nearest_share(own, losses, float(nothing.blocks.sum()))
@@ -277,16 +287,14 @@ def accepted_effect(
         best.ids[first],
         tuple(best.starts[first].values),
         best.refined[first].intervals,
-        {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
+        dict(zip(names, shares, strict=True)),
         nearest,
     )
 
 
 def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ranked]:
     """Every candidate in order, those of the shortlist as refined; ``nothing``: coefficients alone."""
-    refined = [(best.ids[s.candidate], s) for s in best.scored]
-    rest = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order[len(refined) :]]
-    in_order = sorted(refined + rest, key=lambda named: named[1].score)
+    in_order = sorted(scored_by_id(ranking, best), key=lambda named: named[1].score)
     first, alone = in_order[0][1], float(nothing.blocks.sum())
 
     def ranked(name: str, s: Scored) -> Ranked:
