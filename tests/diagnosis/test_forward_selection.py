@@ -203,6 +203,12 @@ def test_all_candidates_are_in_one_order_with_those_of_the_shortlist_as_refined(
     )
 
 
+def ranking_of(ids, order):
+    """A ranking with these candidates."""
+    candidates = [SimpleNamespace(effect=SimpleNamespace(id=name)) for name in ids]
+    return SimpleNamespace(candidates=candidates, order=order)
+
+
 @pytest.mark.parametrize("chosen", [0, 1])
 def test_an_effect_that_is_accepted_has_its_intervals_and_the_shares_of_all(chosen):
     rng = np.random.default_rng(0)
@@ -216,7 +222,9 @@ def test_an_effect_that_is_accepted_has_its_intervals_and_the_shares_of_all(chos
         refined=[SimpleNamespace(intervals={"delta_X_u": (0.0, 2.0)}), SimpleNamespace(intervals={})],
         scored=each,
     )
-    found = accepted_effect(best, np.random.default_rng(1), scored(-1, np.full(20, 9.0)), chosen)
+    ranking = ranking_of(["lag", "X_u"], each)
+    nothing = scored(-1, np.full(20, 9.0))
+    found = accepted_effect(ranking, best, np.random.default_rng(1), nothing, chosen)
     own, other = (each[k].blocks.sum() for k in (chosen, 1 - chosen))
     assert found.nearest == pytest.approx(max((other - own) / (20 * 9.0 - own), 0.0))
     assert found.id == ["lag", "X_u"][chosen]
@@ -235,7 +243,25 @@ def test_what_has_no_other_candidate_is_imitated_by_none():
         scored=[scored(0, [1.0] * 10)],
     )
     nothing = scored(-1, [30.0] * 10)
-    assert accepted_effect(best, np.random.default_rng(1), nothing).nearest == 1.0
+    found = accepted_effect(ranking_of(["X_u"], best.scored), best, np.random.default_rng(1), nothing)
+    assert found.nearest == 1.0
+
+
+def test_a_candidate_out_of_the_shortlist_that_one_block_alone_refutes_has_a_share():
+    """Of drag by |u|u only linear drag had a probability, as the start alone speaks for that: 0.92."""
+    best = SimpleNamespace(
+        ids=["X_u"],
+        starts=[SimpleNamespace(values={"delta_X_u": 1.0})],
+        refined=[SimpleNamespace(intervals={})],
+        scored=[scored(0, [1.0] * 8)],
+    )
+    order = [scored(1, [1.0] * 8), scored(0, [60.0] + [1.0] * 7), scored(2, [9.0] * 8)]
+    ranking, nothing = ranking_of(["X_|u|u", "X_u", "lag"], order), scored(-1, [30.0] * 8)
+    found = accepted_effect(ranking, best, np.random.default_rng(1), nothing)
+    without_it = (1.0 - 1.0 / 8.0) ** 8  # of the draws, in which both have even odds
+    assert found.weights["X_|u|u"] == pytest.approx(0.5 * without_it, abs=0.06)
+    assert found.weights["lag"] < 1e-6, "every block refutes it"
+    assert list(found.weights) == ["X_u", "X_|u|u", "lag"]
 
 
 def test_shares_are_odds_of_scores_on_blocks_that_are_drawn_anew():
@@ -342,7 +368,7 @@ def search_places(monkeypatch, scores, accepted):
 
     def rank(t, beside, others, made, nuisance, *_):
         assert others == beside.effects
-        return SimpleNamespace(nuisance=nuisance, beside=beside)
+        return SimpleNamespace(nuisance=nuisance, beside=beside, order=[])
 
     def reweighted(t, beside, ranking, present):
         assert beside.effects.isdisjoint(present), "the effect whose place is searched is a candidate"
