@@ -12,7 +12,8 @@ from support.measured import sail
 
 from diagnosis import Model, Run
 from diagnosis.predictors import ship_with
-from diagnosis.predictors.thrust import Integral, Response, thrust
+from diagnosis.predictors.thrust import Response, thrust
+from diagnosis.runs.held_signal import Integral
 from fmus.actuators.response import layouts
 from fmus.declare import variables
 from fmus.ops import wrap

@@ -23,12 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictors import Model, WeakWindows, omega, weak_windows
-from ..predictors.thrust import Integral
 from ..predictors.uncertainty import MEASURED, correlated_windows, omega_std
 from ..predictors.weak_form import OVERLAP, inertial, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
+from ..runs.held_signal import Integral
 from ..runs.paired_test import surely_positive
 from ..runs.run_constants import CHANCE, PARTS
 from ..runs.smoothing.command_regression import least_squares

@@ -20,10 +20,11 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import WIDTH
+from ..runs.held_signal import Integral
 from ..runs.run_constants import DIGITS, FAR_OFF
 from .filters import FilterStart
 from .ship_model import Model
-from .thrust import LONGEST_STEP, Integral, Response, drive_of
+from .thrust import LONGEST_STEP, Response, drive_of
 from .traced.compiled_law import compiler
 from .traced.recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
 

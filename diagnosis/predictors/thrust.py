@@ -26,6 +26,7 @@ from fmus.effects.steering_gear import rate_limited
 from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
 from ..runs.files.reading import Run
+from ..runs.held_signal import Integral, like
 from ..runs.linear_filter import filtered
 from .ship_model import Model
 
@@ -232,7 +233,7 @@ class Response:
         return inside + np.minimum(time - t[0], 0.0) + np.maximum(time - t[-1], 0.0)
 
     @cached_property
-    def _commands(self) -> "Integral":
+    def _commands(self) -> Integral:
         """Integral of the commands as they were given; the clock of the pose is late."""
         shares = self._shares
         before = shares[0] if self.moving else 0.0 * shares[0]
@@ -240,7 +241,7 @@ class Response:
         return Integral(edges, shares, before)
 
     @cached_property
-    def _integral(self) -> "Integral":
+    def _integral(self) -> Integral:
         """Of the commands that arrive and the shares that act, (..., 2, k); (..., 1, k): the same."""
         c = self._commands
         if not self.slow:
@@ -323,34 +324,3 @@ class Response:
             for one in range(len(each)):
                 found[k, :, 0, one], found[k, :, 1, one] = arriving[one], shares[one]
         return np.moveaxis(found[-part:], 1, 0).reshape(-1, *found.shape[2:])[: len(commands)]
-
-
-class Integral:
-    """The integral of a signal that is constant between edges, and before and after them.
-
-    Args:
-        edges: (K + 1,) [s].
-        values: (K, ...).
-        before: (...), its value before the first edge.
-    """
-
-    def __init__(self, edges: np.ndarray, values: np.ndarray, before: np.ndarray) -> None:
-        steps = like(np.diff(edges), values.ndim - 1)
-        self.edges, self.values, self.before = edges, values, before
-        self._sums = np.concatenate([0.0 * values[:1], np.cumsum(values * steps, axis=0)])
-
-    def __call__(self, time: np.ndarray) -> np.ndarray:
-        """The integral from the first edge to times (...) [s]."""
-        time, first, last = np.asarray(time), self.edges[0], self.edges[-1]
-        columns = self._sums.reshape(len(self._sums), -1).T
-        inside = np.stack([np.interp(time, self.edges, column) for column in columns], axis=-1)
-        further = self.before.ndim
-        found = inside.reshape(*time.shape, *self.before.shape)
-        found += like(np.minimum(time - first, 0.0), further) * self.before
-        found += like(np.maximum(time - last, 0.0), further) * self.values[-1]
-        return found
-
-
-def like(x: np.ndarray, further: int) -> np.ndarray:
-    """An array with further axes of length one behind its own."""
-    return x.reshape(*x.shape, *[1] * further)

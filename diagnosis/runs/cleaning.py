@@ -14,6 +14,7 @@ from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
 from .columns.columns import other_angles
+from .columns.geographic import unwrapped
 from .columns.unit_check import GO_ON, LARGEST, QUICKEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
@@ -295,11 +296,6 @@ def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
     return row, seconds
 
 
-def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Integral (n, k) over times (n,) [s], from the first one, of values (n, k) that are held."""
-    return np.vstack([0.0 * values[:1], np.cumsum(values[:-1] * np.diff(time)[:, None], axis=0)])
-
-
 def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (n, m) at some times (n,) by linear interpolation of those (k, m) at known ones (k,)."""
     return np.column_stack([np.interp(time, known, x) for x in values.T])
@@ -342,7 +338,7 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     """
     values, coarse = run.pose[:, channels], run.coarse[:, channels]
     if channels == HEADING:
-        values = np.where(np.isfinite(values), np.unwrap(np.nan_to_num(values), axis=0), np.nan)
+        values = unwrapped(values[:, 0])[:, None]
     there = np.isfinite(values).all(axis=1) & ~gone
     repeats = repeated(values, there)
     rows = np.flatnonzero(there & ~repeats)

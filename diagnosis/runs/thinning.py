@@ -8,8 +8,9 @@ import pandas as pd
 
 from fmus.ship import ship
 
-from .cleaning import BRIEF, Track, between, impulse, long_gap
+from .cleaning import BRIEF, Track, long_gap
 from .files.reading import Run
+from .held_signal import Integral
 from .run_constants import DIGITS, EVERY
 from .smoothing.smoother import Smoothed
 
@@ -158,5 +159,5 @@ def _by(part: np.ndarray, values: np.ndarray) -> Any:
 
 def _mean(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Means from each edge (m,) to the next of values (n, k) that are held; the last as it is."""
-    at = between(edges, time, impulse(time, values))
-    return np.vstack([np.diff(at, axis=0) / np.diff(edges)[:, None], values[-1:]])
+    whole = Integral(time, values[:-1], values[0])(edges)
+    return np.vstack([np.diff(whole, axis=0) / np.diff(edges)[:, None], values[-1:]])

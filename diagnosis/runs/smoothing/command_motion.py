@@ -16,7 +16,8 @@ import numpy as np
 from fmus.scale import Scale
 from fmus.ship import ship
 
-from ..cleaning import Track, between, impulse
+from ..cleaning import Track, between
+from ..held_signal import Integral
 from ..linear_filter import filtered
 from .spline import Knots
 
@@ -209,17 +210,11 @@ class Commands:
         return self._recursion((1.0 - kept) * tau, kept)
 
     @cached_property
-    def _impulses(self) -> np.ndarray:
-        """(n, 3), integral of the commands until each row [N s, N s, N m s]."""
-        return impulse(self.track.run.time, self.track.run.tau_cmd)
-
-    def _impulse(self, time: np.ndarray) -> np.ndarray:
-        """Integral (m, 3) of the commands until times (m,) [s]."""
-        run = self.track.run
-        if self.at_rest:
-            time = np.maximum(time, run.time[0])
-        row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
-        return self._impulses[row] + run.tau_cmd[row] * (time - run.time[row])[:, None]
+    def _impulse(self) -> Integral:
+        """Integral of the commands [N s, N s, N m s]."""
+        time, tau = self.track.run.time, self.track.run.tau_cmd
+        edges = np.append(time, time[-1] + self.track.period)
+        return Integral(edges, tau, 0.0 * tau[0] if self.at_rest else tau[0])
 
     def motion(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (m, k) by accelerations (m, k), each held for a step.
