@@ -101,13 +101,18 @@ def degrees_in(cells: pd.Series) -> np.ndarray:
 
 def across_date_line(longitude: np.ndarray) -> np.ndarray:
     """Longitudes (n,), in whatever unit, without the jump of a whole turn at the date line."""
-    there = np.isfinite(longitude)
-    most = float(np.abs(np.diff(longitude[there])).max(initial=0.0))
+    most = float(np.abs(np.diff(longitude[np.isfinite(longitude)])).max(initial=0.0))
     turn = next((t for t in TURNS if abs(most - t) < NEGLIGIBLE * t), None)
     if turn is None:
         return longitude
-    found = longitude.copy()
-    found[there] = np.unwrap(longitude[there], period=turn)
+    return unwrapped(longitude, turn)
+
+
+def unwrapped(angle: np.ndarray, turn: float = 2.0 * np.pi) -> np.ndarray:
+    """An angle (n,) without jumps by half a turn or more; NaN where it is missing."""
+    there = np.isfinite(angle)
+    found = np.full(angle.size, np.nan)
+    found[there] = np.unwrap(angle[there], period=turn)
     return found
 
 

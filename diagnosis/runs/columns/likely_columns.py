@@ -12,6 +12,7 @@ from ...execution.short_text import SHOWN
 from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS, POSE
+from .geographic import unwrapped
 from .name_words import PLAIN, words_of
 from .unit_check import SI_UNIT, UNITS, doubts, largest
 
@@ -200,22 +201,15 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
     with np.errstate(divide="ignore", invalid="ignore"):
         north, east = rate(held["x"]), rate(held["y"])
-        found = {"course": _unwrapped(np.arctan2(east, north))}
+        found = {"course": unwrapped(np.arctan2(east, north))}
         if "psi" in held:
             rows = np.isfinite(pose).all(axis=1) & np.isfinite(t)
             degrees = any("psi" in doubt.signals for doubt in doubts(t[rows], pose[rows]))
-            psi = _unwrapped(np.radians(held["psi"]) if degrees else held["psi"])
+            psi = unwrapped(np.radians(held["psi"]) if degrees else held["psi"])
             surge, sway = rotate_to_body(psi, north, east)
             speeds = {"surge": surge, "sway": sway, "yaw": rate(psi)}
             found |= {f"{axis} speed": speed for axis, speed in speeds.items()}
             found |= {f"{axis} acceleration": rate(speed) for axis, speed in speeds.items()}
-    return found
-
-
-def _unwrapped(angle: np.ndarray) -> np.ndarray:
-    there = np.isfinite(angle)
-    found = np.full(angle.size, np.nan)
-    found[there] = np.unwrap(angle[there])
     return found
 
 
@@ -272,7 +266,7 @@ def _evidence(
         found[f'in %: of its limit, or state the "factor" to {SI_UNIT[quantity]}'] = 0.0
     axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
     if quantity == "angle":  # it may wrap
-        values = _unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
+        values = unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
     pairs = {n: _correlation(values, m) for n, m in motion.items() if n.partition(" ")[0] in axes}
     best = max(pairs, key=lambda name: abs(pairs[name]), default="")
     if best and abs(pairs[best]) >= LIKELY:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.constants import day as whole_day
-from scipy.constants import hour, minute, nano
+import pandas as pd
+from scipy.constants import nano
 
 from ..columns.name_words import words_of
 
@@ -42,12 +42,9 @@ def stamp(whole: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 def calendar(*parts: np.ndarray) -> np.ndarray:
     """A time [s] by year, month, day, hour, minute and second; NaN where one is missing."""
-    there = np.isfinite(parts).all(axis=0)
-    year, month, day, *clock = (np.where(there, part, 1.0) for part in parts)
-    months = (year - 1970.0).astype("M8[Y]").astype("M8[M]") + (month - 1.0).astype("m8[M]")
-    days = months.astype("M8[D]").astype(float) + day - 1.0
-    seconds = sum(size * part for size, part in zip((hour, minute, 1.0), clock, strict=True))
-    return np.where(there, whole_day * days + seconds, np.nan)
+    names = ("year", "month", "day", "hour", "minute", "second")
+    stamps = pd.to_datetime(pd.DataFrame(dict(zip(names, parts, strict=True))), errors="coerce")
+    return np.asarray((stamps - pd.Timestamp(0)) / pd.Timedelta(seconds=1), float)
 
 
 ARRAY = ("[1]", "[2]", "[3]", "[0]")  # of a quaternion as PX4 logs it: its real part is first

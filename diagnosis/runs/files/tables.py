@@ -17,7 +17,7 @@ from cosim import InputError
 from cybership.message_text import quoted
 
 from ..columns.columns import Layout
-from ..columns.geographic import degrees_in, is_of_position
+from ..columns.geographic import degrees_in, is_of_position, unwrapped
 from ..columns.name_words import words_of
 from ..columns.side_car import (
     refuse_encoding,
@@ -245,8 +245,7 @@ def date_stamps(
     begin = stamps.dropna().iloc[0] if since is None else since
     seconds = np.array((stamps - begin).dt.total_seconds(), float)
     if without_date:
-        there = np.isfinite(seconds)
-        seconds[there] = np.unwrap(seconds[there], period=day)
+        seconds = unwrapped(seconds, day)
     ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
 
