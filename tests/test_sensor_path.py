@@ -88,12 +88,13 @@ def test_each_sample_counts_once_on_each_axis_unless_it_is_left_out(without):
     gap = (10.5, 13.5)  # nodes at 10.0 s, and, every second from then on, at 13.5 s
     problem = PathProblem(truth(1.0), SIZES, [gap], without)
     expected = {k for k in range(TIME.size) if TIME[k] <= 10.0 or gap[1] <= TIME[k] < problem.edges[-1]}
-    start, rows, axes = problem.parts[0]
+    _, start, rows, axes = problem.parts[0]
     assert sorted(rows.tolist()) == sorted(expected - without)
     assert (TIME[start] <= TIME[rows]).all()
     assert (TIME[rows] - TIME[start] < 1.0).all()
-    for group, (begin, _) in zip((ALONG, ACROSS, HEADING), axes, strict=True):
-        assert (problem.equations.group[begin : begin + rows.size] == group).all()
+    assert len(axes) == 3
+    for k, group in enumerate((ALONG, ACROSS, HEADING)):
+        assert (problem.equations.group[k * rows.size : (k + 1) * rows.size] == group).all()
         assert np.sum(problem.equations.group == group) == rows.size
 
 

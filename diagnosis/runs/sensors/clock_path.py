@@ -20,10 +20,11 @@ those of restricted maximum likelihood, by the fixed point of Harville (1977), J
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky_banded
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from ..cleaning import noise as noise_of
 from ..smoothing.outliers import OUTLIER
@@ -50,7 +51,6 @@ LEAST = (
 BEGIN = 0.1  # 1, of the walks in a second, times the noise or the rate; first guess
 SWEEPS = 25  # 1, of the fixed point; chosen: the likelihood then changes by less than 0.1
 FURTHER = 1.0  # 1, of a logarithm, by which a secant leads beyond a step at the most; chosen
-Component = tuple[int, np.ndarray]  # 0, 1 or 2 for north, east or heading, and (n,) of directions
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 
@@ -94,65 +94,52 @@ class PathProblem:
     def _build(self, rows: np.ndarray, at: np.ndarray) -> None:
         """The equations, of samples in some rows after their nodes, from node to node, and of priors."""
         e, m, nodes, steps = self.evidence, self.nodes.size, self.nodes, np.diff(self.edges)
-        c, s = np.cos(e.psi), np.sin(e.psi)
-        one, none = np.ones_like(c), np.zeros_like(c)
-        axes = np.stack([np.column_stack(a) for a in ((c, s, none), (-s, c, none), (none, none, one))])
+        c, s, none = np.cos(e.psi), np.sin(e.psi), np.zeros_like(e.psi)
+        sides = ((c, s, none), (-s, c, none), (none, none, none + 1.0))  # along, across, heading
+        axes = np.array([np.column_stack(side) for side in sides])
         pose = np.column_stack([e.run.pose[:, :2] - e.run.pose[e.rows[0], :2], e.psi])
         moved = np.column_stack([e.gone, e.turned])
-        measured = [0, 1] * (e.velocity is not None) + [2] * (e.rate is not None)
-        entries: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # equation, unknown, factor
-        # Of the samples and of the nodes what constants change: rows of begin and end, and of each axis
-        # its first equation and its direction, of which only what is not zero everywhere.
-        self.parts: list[tuple[np.ndarray, np.ndarray, list[tuple[int, list[Component]]]]] = []
-        right, groups, lengths = [], [], []
-
-        def add(
-            group: int, of: list[tuple[np.ndarray, np.ndarray]], y: np.ndarray, h: np.ndarray
-        ) -> int:
-            begin = sum(each.size for each in right)
-            entries.extend((begin + np.arange(y.size), u, np.broadcast_to(f, y.shape)) for u, f in of)
-            right.append(y)
-            groups.append(np.full(y.size, group))
-            lengths.append(np.broadcast_to(h, y.shape))
-            return begin
-
-        def ahead(a: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-            return (a * (moved[end] - moved[start])).sum(axis=1)
-
-        one, clock = np.ones(1), STATES - 1
         speed, turn = (np.linalg.norm(np.diff(x[nodes], axis=0), axis=1) for x in (e.gone, moved[:, 2:]))
         moves = np.array([x > still * steps for x, still in zip((speed, turn), e.still, strict=True)])
-        moves = moves[[0, 0, 1]]  # along, across, heading
-        start, each = nodes[at], []
-        for k in measured:  # samples of the pose
-            a = axes[k][rows]
-            of = [(STATES * at + i, a[:, i]) for i in range(clock) if a[:, i].any()]
-            way, by_clock = ahead(a, start, rows), moves[k][at]
-            of.append((STATES * at + clock, way * by_clock))
-            y = (a * pose[rows]).sum(axis=1) - way * ~by_clock
-            each.append((add(k, of, y, one), _components(a)))
-        self.parts.append((start, rows, each))
+        moves, clock, every = moves[[0, 0, 1]], STATES - 1, np.arange(m)
+        matrices, columns = [], []  # of each group of equations; its number, right sides and time steps
+
+        def add(
+            group: int, node: np.ndarray, factors: Any, right: Any, step: Any = 1.0, first: int = 0
+        ) -> None:
+            """Equations of unknowns in a row, from one of each node on."""
+            f = np.column_stack(factors)
+            unknown = STATES * node[:, None] + first + np.arange(f.shape[1])
+            ends = np.arange(0, f.size + 1, f.shape[1])
+            matrices.append(csr_array((f.ravel(), unknown.ravel(), ends), shape=(len(f), STATES * m)))
+            columns.append([np.broadcast_to(x, node.shape) for x in (group, right, step)])
+
         j = np.flatnonzero(~self.cut)
-        start, end, each = nodes[j], nodes[j + 1], []
-        for k in measured:  # from node to node
-            a = axes[k][start]
-            of = [(STATES * j + i, -a[:, i]) for i in range(clock)]
-            of += [(STATES * (j + 1) + i, a[:, i]) for i in range(clock)]
-            way, by_clock = ahead(a, start, end), moves[k][j]
-            of.append((STATES * j + clock, -way * by_clock))
-            begin = add(TURN if k == HEADING else DRIFT, of, way * ~by_clock, steps[j])
-            each.append((begin, _components(-a)))
-        self.parts.append((start, end, each))
+        measured = [0, 1] * (e.velocity is not None) + [2] * (e.rate is not None)
+        at_rows, at_nodes = axes[measured][:, rows], axes[measured][:, nodes[j]]
+        # What constants change: the first equation of samples and of nodes, rows of begin and end, and
+        # the directions of the axes.
+        self.parts = (
+            (0, nodes[at], rows, at_rows),
+            (rows.size * len(measured), nodes[j], nodes[j + 1], -at_nodes),
+        )
+        for k, a in zip(measured, at_rows, strict=True):  # pose of a node + way from there = sample
+            way = (a * (moved[rows] - moved[nodes[at]])).sum(axis=1)
+            timed = np.where(moves[k][at], way, 0.0)
+            add(k, at, (a, timed), (a * pose[rows]).sum(axis=1) - (way - timed))
+        for k, a in zip(measured, at_nodes, strict=True):  # pose of the next node - pose of a node = way
+            way = (a * (moved[nodes[j + 1]] - moved[nodes[j]])).sum(axis=1)
+            timed = np.where(moves[k][j], way, 0.0)
+            add(TURN if k == HEADING else DRIFT, j, (-a, -timed, a), way - timed, steps[j])
         j = np.flatnonzero(~self.cut[:-1] & ~self.cut[1:])
-        of = [(STATES * (j + 1) + clock, one), (STATES * j + clock, -one)]
-        add(CLOCK, of, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
-        add(RATE, [(STATES * np.arange(m) + clock, one)], np.ones(m), one)
+        change = np.tile([-1.0, 0.0, 0.0, 0.0, 1.0], (j.size, 1))
+        add(CLOCK, j, (change,), 0.0, 0.5 * (steps[j] + steps[j + 1]), first=clock)
+        add(RATE, every, (np.ones(m),), 1.0, first=clock)
         for i in range(clock):
-            add(FIXED, [(STATES * np.arange(m) + i, np.array([NEGLIGIBLE]))], np.zeros(m), one)
-        equation, unknown, factor = (np.concatenate(each) for each in zip(*entries, strict=True))
-        self.right, group = np.concatenate(right), np.concatenate(groups)
-        matrix = csr_array((factor, (equation, unknown)), shape=(group.size, STATES * m))
-        root = 1.0 / np.sqrt(np.concatenate(lengths))
+            add(FIXED, every, (np.full(m, NEGLIGIBLE),), 0.0, first=i)
+        matrix: Any = vstack(matrices, format="csr")
+        group, self.right, lengths = (np.concatenate(x) for x in zip(*columns, strict=True))
+        root = 1.0 / np.sqrt(lengths)
         self.present = sorted(set(group.tolist()) - {RATE, FIXED})
         normals = []
         for g in range(FIXED + 1):  # lower band of M^T W M, in which two neighbouring nodes lie
@@ -169,13 +156,13 @@ class PathProblem:
         run = np.interp(self.evidence.time, self.edges, integral_of(self.edges, clock))
         pace = np.diff(run) / np.diff(self.evidence.time)
         for k, fault in enumerate(constants):
-            path = np.ascontiguousarray(fault.path.T)
+            path = fault.path
             if fault.clocked:
-                path = np.hstack([np.zeros((3, 1)), np.cumsum(np.diff(path) * pace, axis=1)])
-            for start, end, axes in self.parts:
-                moved = path[:, end] - path[:, start]
-                for begin, direction in axes:
-                    made[begin : begin + end.size, k] = sum(a * moved[i] for i, a in direction)
+                steps = np.diff(path, axis=0) * pace[:, None]
+                path = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+            for begin, start, end, a in self.parts:
+                change = np.einsum("qni,ni->qn", a, path[end] - path[start]).ravel()
+                made[begin : begin + change.size, k] = change
         return made
 
     def solve(self, constants: Sequence[FaultColumn], fixed_clock: bool = False) -> "Path":
@@ -202,12 +189,9 @@ class PathProblem:
 
     def outliers(self, path: "Path") -> frozenset[int]:
         """Samples far from the path."""
-        far: set[int] = set()
-        _, rows, axes = self.parts[0]
-        for begin, _ in axes:
-            off = np.abs(path.residual[begin : begin + rows.size])
-            far |= set(rows[off > OUTLIER].tolist())
-        return frozenset(far)
+        _, _, rows, a = self.parts[0]
+        off = np.abs(path.residual[: len(a) * rows.size]).reshape(len(a), -1)
+        return frozenset(rows[(off > OUTLIER).any(axis=0)].tolist())
 
 
 class Path:
@@ -283,11 +267,6 @@ def noisier_than_pose(e: Evidence, of_pose: Sequence[float]) -> bool:
     walks = [0.0 if x is None else float(np.hypot.reduce(noise_of(x))) for x in beside]
     walked = np.sqrt(step * SPACING) * np.array(walks)
     return bool((walked > np.asarray(of_pose)).any())
-
-
-def _components(directions: np.ndarray) -> list[Component]:
-    """What is not zero everywhere of directions (n, 3): north, east, heading."""
-    return [(i, directions[:, i].copy()) for i in range(3) if directions[:, i].any()]
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:

@@ -228,15 +228,11 @@ def _clock(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     clock = ("time", "clock_rate", "1")
     if not found.wanders:
-        scales, text = (
-            _even(found),
-            "the clock of the log is wrong throughout: {:.4g} s pass in one second of it",
-        )
-        if scales is None:
+        if (rate := _even(found)) is None:
             return []
-        text = text.format(scales[0]) + ", by speed and turn"
-        alike = ("scale of all speeds and rates",)
-        return [SensorFinding.estimated(clock, *scales, found.path.problem.edges, text, alike)]
+        text = f"the clock of the log is wrong throughout: {rate[0]:.4g} s pass in one second of it"
+        text, alike = f"{text}, by speed and turn", ("scale of all speeds and rates",)
+        return [SensorFinding.estimated(clock, *rate, found.path.problem.edges, text, alike)]
     alike, or_else, aside = (), "", ()
     if found.either:
         alike, or_else = tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}"
