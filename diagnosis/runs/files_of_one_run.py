@@ -14,13 +14,13 @@ from cosim import InputError
 from .columns.columns import UNITS, Column, Layout, stated_layout, to_si
 from .columns.name_words import words_of
 from .columns.proposal import text_of, time_column, units_below
+from .columns.unit_check import LARGEST
 from .columns.usual_names import value_column
 from .files.tables import MeasuredTable, clock_seconds, date_stamps, numbers
 from .run_constants import NEGLIGIBLE
 
 Item = TypeVar("Item", str, Path)
 TIME = "time"  # the column of the time in the one table
-DATED = 1e8  # s, about three years: a log's times since 1970 are later, and no other clock counts as far
 UNIT = frozenset(("unit", "units"))  # of that with their units
 NUMBER = frozenset(("id", "index", "channel", "instance"))  # of that with numbers in place of names
 
@@ -157,7 +157,7 @@ def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     dated = [own is not None for own in stamps]
     if not any(dated):
         return times
-    if all(np.nanmedian(time) > DATED for time in times):
+    if all(np.nanmedian(time) > LARGEST for time in times):  # numbers of an epoch, too
         return [time - times[0][np.isfinite(times[0])][0] for time in times]
     if not all(dated):
         stamped, other = parts[dated.index(True)].path, parts[dated.index(False)].path

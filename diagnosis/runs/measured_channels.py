@@ -14,7 +14,7 @@ from .cleaning import Z95, noise
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
 from .frozen import repeated
-from .run_constants import DIGITS, ORDER
+from .run_constants import DIGITS, ORDER, SAME
 from .sensors.evidence import SURE, VELOCITIES
 from .smoothing.smoother import Smoothed
 
@@ -174,4 +174,4 @@ def _correlation(time: np.ndarray, off: np.ndarray) -> float:
     size = float(np.mean(off**2))
     rho = float(np.mean((off[1:] * off[:-1])[near])) / size if size > 0.0 and near.any() else 0.0
     sure = SURE / float(np.sqrt(near.sum() + 1.0))  # of white residuals
-    return -period / float(np.log(min(rho, 0.999))) if rho > sure else 0.0
+    return -period / float(np.log(min(rho, SAME))) if rho > sure else 0.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from dateutil.parser import parse
-from scipy.constants import day, nano
+from scipy.constants import day, minute, nano
 
 from cosim import InputError
 from cybership.message_text import quoted
@@ -51,7 +51,6 @@ IDEOGRAPHS = str.maketrans(
 )
 TICKS = 1e17, 1e18  # 1, counts of 100 ns since the year 1601 or 1; of 1 ns since 1970 there are more
 ORDINAL = re.compile(r"\d{4}-\d{3}")  # a year and a day in it, as of ISO 8601
-FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
 
 @contextmanager
@@ -375,10 +374,10 @@ def _of_clock(time: np.ndarray) -> np.ndarray | None:
     hours, minutes, seconds = there // 1e4, there // 1e2 % 100.0, there % 100.0
     months, days = dates // 1e2 % 100.0, dates % 100.0
     is_date = (dates == 0.0) | ((months >= 1.0) & (months <= 12.0) & (days >= 1.0) & (days <= 31.0))
-    is_clock = is_date & (hours < 24.0) & (minutes < FULL) & (seconds < FULL)
+    is_clock = is_date & (hours < 24.0) & (minutes < minute) & (seconds < minute)
     if not (there.size and is_clock.all() and np.ptp(minutes) > 0.0):
         return None
-    if seconds.min() > 0.1 * FULL or seconds.max() < 0.9 * FULL:  # these do not end a minute
+    if seconds.min() > 0.1 * minute or seconds.max() < 0.9 * minute:  # these do not end a minute
         return None
     found = np.full_like(time, np.nan)
     found[np.isfinite(time)] = np.unwrap(3600.0 * hours + 60.0 * minutes + seconds, period=day)

@@ -6,7 +6,7 @@ where a telegram arrived the lines meet, mostly between two rows.
 
 import numpy as np
 
-from ..run_constants import IN_A_ROW
+from ..run_constants import DIGITS, IN_A_ROW, NEGLIGIBLE
 
 # 1, a row is on a line to rounding, which must be less than this share of the distance of the other
 # rows. With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
@@ -29,7 +29,7 @@ def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndar
         return none
     share = (np.diff(time)[:-1] / (time[2:] - time[:-2]))[:, None]
     off = np.abs(position[1:-1] - position[:-2] - share * (position[2:] - position[:-2])).max(axis=1)
-    rounding = 1.05 * max(step, float(np.sqrt(np.finfo(float).eps) * np.ptp(position, axis=0).max()))
+    rounding = (1.0 + NEGLIGIBLE) * max(step, DIGITS * float(np.ptp(position, axis=0).max()))
     on = none.copy()
     on[1:-1] = off <= rounding
     # A long line is a ship's steady motion, unless what is on no line are single kinks.
