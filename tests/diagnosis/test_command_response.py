@@ -28,8 +28,6 @@ from diagnosis.runs.smoothing.command_motion import (
 from diagnosis.runs.smoothing.command_regression import Regression, least_squares
 from diagnosis.runs.smoothing.lateness import (
     Searched,
-    by_delay,
-    by_lag,
     likeliest_delay,
     likeliest_late,
     searched,
@@ -366,17 +364,17 @@ def test_a_search_ends_where_least_is_left_unless_chance_gives_as_much(best, hei
     assert found.best == (best if best and height >= enough else 0)
 
 
-@pytest.mark.parametrize("way", [by_delay, by_lag])
+@pytest.mark.parametrize("way", Lateness._fields)
 @pytest.mark.parametrize("time", [0.0, 0.1, 0.3, 0.6])
 @pytest.mark.parametrize("size", [0.8, 1.0])
 def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, time, size):
     """Each by its own way; fitted is how late, and gains too large as a whole do not hide it."""
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     r = regression(jumping(hold=20, seed=4), psi=0.1 * TIME)
-    p = r.problem._replace(z=r.commands.response(Gains(size * G), way(time)).eta)
+    p = r.problem._replace(z=r.commands.response(Gains(size * G), Lateness(**{way: time})).eta)
     p = p._replace(sigma=np.full(3, 1e-3))
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    assert likeliest_late(again, way, G) == pytest.approx(way(time))
+    assert likeliest_late(again, way, G) == pytest.approx(Lateness(**{way: time}))
 
 
 @pytest.mark.parametrize(
@@ -399,9 +397,11 @@ def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
         )
 
     def explained(by, smoothness, weights, late, described, way):
-        return one(-1000.0 - (with_delay if way is by_delay else with_lag), late)
+        return one(-1000.0 - (with_delay if way == "delay" else with_lag), late)
 
-    monkeypatch.setattr(command_response, "likeliest_late", lambda by, way, described: way(0.4))
+    monkeypatch.setattr(
+        command_response, "likeliest_late", lambda by, way, described: Lateness(**{way: 0.4})
+    )
     monkeypatch.setattr(command_response, "explained", explained)
     found = command_response.explained_late(one(-1000.0, Lateness(before)), None, None, 0.0)
     assert found.response.late == late
@@ -412,7 +412,7 @@ def test_lateness_that_makes_no_difference_to_a_motion_is_none(monkeypatch):
     noticed = round(BRIEF / H)
     for best, late in ((0, 0.0), (noticed, BRIEF), (noticed + 2, BRIEF + 2 * H)):
         monkeypatch.setattr(lateness, "searched", lambda left, c, best=best: Searched(best, {0, best}))
-        assert likeliest_late(r, by_delay, np.eye(3)) == pytest.approx(by_delay(late))
+        assert likeliest_late(r, "delay", np.eye(3)) == pytest.approx(Lateness(late))
     monkeypatch.setattr(lateness, "BRIEF", 2.0 * BRIEF)
     monkeypatch.setattr(lateness, "searched", lambda left, c: Searched(noticed, {0, noticed}))
-    assert likeliest_late(r, by_delay, np.eye(3)) == by_delay(0.0)
+    assert likeliest_late(r, "delay", np.eye(3)) == Lateness()

@@ -18,7 +18,6 @@ by H alone. A fitted G without H takes their place where it is likelier: the des
 another ship.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +25,7 @@ import numpy as np
 from ..run_constants import NEGLIGIBLE
 from .command_motion import CommandResponse, Commands, Lateness
 from .command_regression import Regression, described_gains
-from .lateness import by_delay, by_lag, likeliest_delay, likeliest_late
+from .lateness import likeliest_delay, likeliest_late
 from .likelihood import adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -56,7 +55,7 @@ def explained(
     weights: np.ndarray,
     late: Lateness,
     described: np.ndarray | None,
-    way: Callable[[float], Lateness] | None = None,
+    way: str | None = None,
 ) -> Explained:
     """Gains, smoothness and lateness in turn, as long as the pose becomes likelier.
 
@@ -66,7 +65,7 @@ def explained(
         weights: (n, 3), of the samples.
         late: how late the commands act at first.
         described: G (3, 3), or None where it is fitted.
-        way: in which they may act later, beside described gains; None: as at first.
+        way: delay or lag, by which they may act later, beside described gains; None: as at first.
     """
     p, commands, found = by.problem, by.commands, None
     while True:
@@ -100,7 +99,7 @@ def explained_late(
     """
     found, before = prompt, prompt.response.late
     least = 0.0 if before.delay else NEGLIGIBLE * (base - prompt.cost)
-    for way in (by_delay, by_lag):
+    for way in Lateness._fields:
         late = likeliest_late(prompt.again, way, described)
         if late != before:
             one = explained(prompt.again, prompt.smoothness, weights, late, described, way)

@@ -22,7 +22,7 @@ from scipy.linalg import orth
 from ..cleaning import BRIEF
 from ..paired_test import surely_positive
 from ..run_constants import CHANCE
-from .command_motion import FORGETTING, Commands, Lateness
+from .command_motion import FORGETTING, PROMPT, Commands, Lateness
 from .command_regression import Regression, least_squares, unlike
 
 # s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
@@ -96,20 +96,8 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     return best * period, sure
 
 
-def by_delay(time: float) -> Lateness:
-    """Commands act a time [s] later."""
-    return Lateness(delay=time)
-
-
-def by_lag(time: float) -> Lateness:
-    """Commands act behind a lag [s]."""
-    return Lateness(lag=time)
-
-
-def likeliest_late(
-    regression: Regression, way: Callable[[float], Lateness], described: np.ndarray
-) -> Lateness:
-    """How late commands act, in one way, whose gains (3, 3) are those of the ship's description.
+def likeliest_late(regression: Regression, way: str, described: np.ndarray) -> Lateness:
+    """How late commands act by a delay or by a lag, with the gains (3, 3) of the ship's description.
 
     Fitted beside are H, and the size of the described gains: too large ones would pass for late ones.
     Where there is hardly noise, what is not described is likelier with some lateness, which is brief.
@@ -120,11 +108,11 @@ def likeliest_late(
     @cache
     def left(periods: int) -> float:
         """-2 log L, but for a constant."""
-        late = way(periods * period)
+        late = PROMPT._replace(**{way: periods * period})
         quick = regression.motion(commands.tau_late(late) @ described.T)
         slow = regression.motions(commands.slow(late))
         each = zip(map(np.hstack, zip(quick, slow, strict=True)), regression.pose, strict=True)
         return sum(float(np.square(z[:, 0] - a @ unlike(a, z)).sum()) for a, z in each)
 
     found = searched(left, commands).best * period
-    return way(found if found >= BRIEF * commands.track.scale.time else 0.0)
+    return PROMPT._replace(**{way: found if found >= BRIEF * commands.track.scale.time else 0.0})
