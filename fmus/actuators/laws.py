@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import pi
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..declare import POSITIVE, Range
 from ..effects.families import PROPELLERS, TUNNEL_THRUSTER
@@ -45,6 +45,33 @@ class OnShaft:
     @classmethod
     def limits(cls, p: "Bollard | OpenWater") -> tuple[Span, ...]:
         return ((p.n_min, p.n_max),)
+
+
+class RudderForce:
+    """What rudders have in common: an angle, and a normal force by the square of the flow."""
+
+    commands = (Command("delta", "rad", "rudder angle"),)
+    pushes = "XY"
+    limiting = ("delta_max",)
+
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
+        return ((-p.delta_max, p.delta_max),)
+
+    @classmethod
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        delta = commands[0] + p.bias
+        u, v = cls.met(flow, p)
+        normal = 0.5 * p.water_density * p.area * p.lift * sqrt(u * u + v * v)
+        # Astern as well the angle of the flow is delta - arctan(v / u).
+        normal = normal * (u * sin(delta) - v * cos(delta))
+        along = (1.0 - p.steering_deduction) * normal * sin(delta)
+        return -along, -(1.0 + p.hull_force) * normal * cos(delta)
+
+    @classmethod
+    def met(cls, flow: Flow, p: Any) -> tuple[Number, Number]:
+        """Velocity of the water that meets it along the ship, and from port [m/s]."""
+        raise NotImplementedError
 
 
 class FixedPropeller(OnShaft, Law[Bollard]):
@@ -312,7 +339,7 @@ class Foil(NamedTuple):
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
 
 
-class Rudder(Law[Foil]):
+class Rudder(RudderForce, Law[Foil]):
     """Rudder in a free flow: a normal force by the square of the flow (Yasukawa and Yoshimura 2015).
 
     A positive angle of a rudder aft turns a ship that goes ahead to starboard. What it is asked for is
@@ -320,27 +347,13 @@ class Rudder(Law[Foil]):
     """
 
     name = "rudder"
-    commands = (Command("delta", "rad", "rudder angle"),)
     components = "Y"
-    pushes = "XY"
-    limiting = ("delta_max",)
     changes = (Change("bias", ("bias",), "angle at the command 0"),)
     Parameters = Foil
 
     @classmethod
-    def limits(cls, p: Foil) -> tuple[Span, ...]:
-        return ((-p.delta_max, p.delta_max),)
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Foil) -> tuple[Number, Number]:
-        delta = commands[0] + p.bias
-        u = (1.0 - p.wake) * flow.u
-        # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
-        across = u * sin(delta) + flow.v * cos(delta)
-        speed = sqrt(u * u + flow.v * flow.v)
-        normal = 0.5 * p.water_density * p.area * p.lift * speed * across
-        along = (1.0 - p.steering_deduction) * normal * sin(delta)
-        return -along, -(1.0 + p.hull_force) * normal * cos(delta)
+    def met(cls, flow: Flow, p: Foil) -> tuple[Number, Number]:
+        return (1.0 - p.wake) * flow.u, -flow.v
 
     @staticmethod
     def _full(flow: Flow, p: Foil) -> Number:

@@ -9,9 +9,9 @@ ship's origin.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Range, group_of, variables
-from ..ops import Number, atan2, cos, exp, fmax, fmin, sin, sqrt, where
-from .law import Change, Command, Flow, Law, Span
-from .laws import DIVISOR, SMALL, OpenWater, OpenWaterPropeller
+from ..ops import Number, atan2, exp, fmax, fmin, sqrt, where
+from .law import Change, Flow, Law
+from .laws import DIVISOR, SMALL, OpenWater, OpenWaterPropeller, RudderForce
 
 
 class DriftWake(NamedTuple):
@@ -80,7 +80,7 @@ def covered(diameter: Number, span: Number) -> Number:
     return fmin(diameter / span, 1.0)
 
 
-class RudderInRace(Law[RaceFoil]):
+class RudderInRace(RudderForce, Law[RaceFoil]):
     """Rudder in the race of a propeller.
 
     u_R = epsilon u (1 - w) sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta) with
@@ -90,9 +90,6 @@ class RudderInRace(Law[RaceFoil]):
     """
 
     name = "rudder_in_race"
-    commands = (Command("delta", "rad", "rudder angle"),)
-    pushes = "XY"
-    limiting = ("delta_max",)
     in_race = True
     changes = (
         Change("inflow_speed", ("inflow",), "wake at the rudder"),
@@ -105,23 +102,9 @@ class RudderInRace(Law[RaceFoil]):
     Parameters = RaceFoil
 
     @classmethod
-    def limits(cls, p: RaceFoil) -> tuple[Span, ...]:
-        return ((-p.delta_max, p.delta_max),)
-
-    @classmethod
     def acts_at(cls, x: Number, p: RaceFoil) -> Number:
         """Where rudder and hull together have their force."""
         return (x + p.hull_force * p.hull_force_place) / (1.0 + p.hull_force)
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
-        (delta,) = commands
-        angle = delta + p.bias
-        u, v = cls.met(flow, p)
-        normal = 0.5 * p.water_density * p.area * p.lift * sqrt(u * u + v * v)
-        normal = normal * (u * sin(angle) - v * cos(angle))
-        along = (1.0 - p.steering_deduction) * normal * sin(angle)
-        return -along, -(1.0 + p.hull_force) * normal * cos(angle)
 
     @classmethod
     def met(cls, flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
