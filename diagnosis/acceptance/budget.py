@@ -24,7 +24,7 @@ from cosim.campaign import Posterior, read_posterior
 
 from ..predictors import Model
 from ..predictors.shooting import Shooting
-from ..runs import Fingerprint, Smoothed, body_velocity, fingerprints
+from ..runs import Fingerprint, body_velocity, fingerprints
 from ..runs.run_constants import DIGITS
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED, InputStd
@@ -199,13 +199,9 @@ def _initial(p: Predictions, base: np.ndarray) -> Variances:
         for k in range(3):
             moved = value.copy()
             moved[:, k] += std[:, k]
-            states.append(_in_body(replace(s, **{name: moved})))
+            other = replace(s, **{name: moved})
+            states.append(replace(other, nu=body_velocity(other.eta[:, 2], other.eta_dot)))
     return _squares(*(difference(m, base) for m in p.from_others(states)))
-
-
-def _in_body(s: Smoothed) -> Smoothed:
-    """A run with the velocity of the body as pose and rates have it."""
-    return replace(s, nu=body_velocity(s.eta[:, 2], s.eta_dot))
 
 
 def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Variances:

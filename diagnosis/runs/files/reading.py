@@ -272,12 +272,11 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
     columns |= {s: _earlier(columns[s], columns["time"], by) for s, by in late.items()}
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
-    notes = [
-        f"{s}: {note}"
-        for s in columns
-        if s not in ("time", *layout.unused)
-        for note in _no_numbers(table[layout.column(s).name], columns[s])
-    ]
+    notes: list[str] = []
+    for signal in [s for s in columns if s not in ("time", *layout.unused)]:
+        cells = table[layout.column(signal).name]
+        words = has_words(cells) & np.isnan(columns[signal])
+        notes += (f"{signal}: {note}" for note in _told(cells, words, "cell", "without a number"))
     notes += _by_compass(layout.column("psi"))
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
     return replace(
@@ -341,11 +340,6 @@ def _without_marks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, l
     ]
 
 
-def _no_numbers(cells: pd.Series, values: np.ndarray) -> list[str]:
-    """A note of the cells of a signal that have words, and no value (n,)."""
-    return _told(cells, has_words(cells) & np.isnan(values), "cell", "without a number")
-
-
 def _told(cells: pd.Series, words: np.ndarray, what: str, how: str) -> list[str]:
     """A note of the cells (n,) of a column that have words, with the first; none if there are none."""
     if not words.any():
@@ -367,7 +361,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
             return None
         return np.nan_to_num(held_values(np.column_stack([columns[s] for s in group])), nan=0.0)
 
-    false = _false_commands(columns, of) | _false_winds(columns)
+    false = _false_cells(columns, of)
     columns = columns | {s: np.where(cells, np.nan, columns[s]) for s, cells in false.items()}
     tau, commands, power = map(held, (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
@@ -419,11 +413,12 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     )
 
 
-def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np.ndarray]:
+def _false_cells(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np.ndarray]:
     """Signal -> (n,), cells of an actuator's command that are far beyond its limit, where most are not.
 
     Loggers write numbers such as -999 where they have no value: one number, and nothing between it and
-    the limit, if that is less far. An angle without a limit is turned on.
+    the limit, if that is less far. An angle without a limit is turned on. The speed of a wind is a
+    magnitude: it is not below zero.
     """
     found = {}
     for signal, _, limit in _limits(columns, of):
@@ -434,7 +429,8 @@ def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np
             far = beyond
         if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
             found[signal] = far
-    return found
+    speeds = {s: columns[s] < 0.0 for s in (TRUE_WIND[0], RELATIVE_WIND[0]) if s in columns}
+    return found | {s: below for s, below in speeds.items() if below.any()}
 
 
 def _clipped(columns: Mapping[str, np.ndarray], of: Ship) -> tuple[str, ...]:
@@ -456,12 +452,6 @@ def _limits(columns: Mapping[str, np.ndarray], of: Ship) -> Iterator[tuple[str, 
     for form, layout in zip(of.command_forms, of.layouts, strict=True):
         each = zip(form.items(), largest_commands(layout, of, np.inf).tolist(), strict=True)
         yield from ((signal, unit, limit) for (signal, unit), limit in each if signal in columns)
-
-
-def _false_winds(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Signal -> (n,), cells of a wind's speed below zero, as it is a magnitude."""
-    found = {s: columns[s] < 0.0 for s in (TRUE_WIND[0], RELATIVE_WIND[0]) if s in columns}
-    return {s: cells for s, cells in found.items() if cells.any()}
 
 
 def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
