@@ -188,31 +188,25 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
     padded = np.zeros((channels, WIDTH, parts * MEMORY))
     padded[:, 0] = 1.0
     padded[..., :size] = factors
-    # Blocks of five coefficients, of all channels and parts (last) side by side.
-    blocks = padded.reshape(channels, WIDTH, parts, -1, DEGREE).transpose(3, 4, 1, 0, 2)
-    corner = np.zeros((len(blocks), DEGREE, DEGREE, channels, parts))  # of L, in a block
-    below, back = np.zeros_like(corner), np.zeros_like(corner)  # of L, under it; the corner's inverse
+    # Blocks of five coefficients: (blocks, channels, parts, six, five).
+    blocks = padded.reshape(channels, WIDTH, parts, -1, DEGREE).transpose(3, 0, 2, 1, 4)
+    corner = np.zeros((*blocks.shape[:3], DEGREE, DEGREE))  # of L, in a block
+    below = np.zeros_like(corner)  # of L, under it
     for j in range(DEGREE):
-        corner[:, j:, j] = blocks[:, j, : DEGREE - j]
-        below[:, : j + 1, j] = blocks[:, j, DEGREE - j :]
-    for i in range(DEGREE):
-        back[:, i, i] = 1.0 / corner[:, i, i]
-        for j in range(i):
-            back[:, i, j] = -back[:, i, i] * (corner[:, i, j:i] * back[:, j:i, j]).sum(axis=1)
-    own, turn = (np.einsum("nki...,nkj...->nij...", x, back) for x in (back, -below.swapaxes(1, 2)))
+        corner[..., j:, j] = blocks[..., : DEGREE - j, j]
+        below[..., : j + 1, j] = blocks[..., DEGREE - j :, j]
+    back = np.linalg.inv(corner)
+    own, turn = back.swapaxes(-1, -2) @ back, -below @ back
     diagonal, beside = np.zeros_like(own), np.zeros_like(own)
     later = np.zeros_like(own[0])
     for _ in range(2):  # once to forget the start
-        later = np.concatenate([later[..., 1:], 0.0 * later[..., :1]], axis=-1)
+        later = np.concatenate([later[:, 1:], 0.0 * later[:, :1]], axis=1)
         for k in range(len(own) - 1, -1, -1):
-            np.einsum("ik...,kj...->ij...", later, turn[k], out=beside[k])
-            diagonal[k] = later = own[k] + np.einsum("ki...,kj...->ij...", turn[k], beside[k])
-    found = np.empty((WIDTH, channels, parts, len(own), DEGREE))
-    for j in range(DEGREE):
-        for i in range(WIDTH):
-            of, row = (diagonal, i + j) if i + j < DEGREE else (beside, i + j - DEGREE)
-            found[i, ..., j] = np.moveaxis(of[:, row, j], 0, -1)
-    return found.reshape(WIDTH, channels, -1)[..., :size].swapaxes(1, 2)
+            beside[k] = later @ turn[k]
+            diagonal[k] = later = own[k] + turn[k].swapaxes(-1, -2) @ beside[k]
+    both = np.concatenate([diagonal, beside], axis=-2)
+    found = np.array([[both[..., i + j, j] for j in range(DEGREE)] for i in range(WIDTH)])
+    return found.transpose(0, 3, 4, 2, 1).reshape(WIDTH, channels, -1)[..., :size].swapaxes(1, 2)
 
 
 class SplineCovariance(NamedTuple):
