@@ -93,7 +93,7 @@ def allocate(
         spans.append((count * low, count * high) if count > 1 else (low, high))
     wanted = [tau[k] for k in asked]
     if len(parts) == len(asked):
-        exact = _eliminated(ship, columns, wanted)
+        exact = _eliminated([[*row] for row in zip(*columns, strict=True)], wanted, _order(ship))
         found = [clip(f, low, high) for f, (low, high) in zip(exact, spans, strict=True)]
     else:
         found = _shared(columns, spans, wanted)
@@ -145,24 +145,23 @@ def solution(ship: Description, tau: Sequence[Number], values: Sequence[Fields])
     every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
     columns = [_column(c, *every[c.actuator.k][1:]) for c in components(ship)]
     asked = axes(ship)
-    found = _eliminated(ship, [[c[k] for k in asked] for c in columns], [tau[k] for k in asked])
+    rows = [[c[k] for c in columns] for k in asked]
+    found = _eliminated(rows, [tau[k] for k in asked], _order(ship))
     return found[0], found[1], found[2]
 
 
 def _eliminated(
-    ship: Description, columns: Sequence[Sequence[Number]], wanted: Sequence[Number]
+    rows: list[list[Number]], wanted: Sequence[Number], order: Sequence[tuple[int, int]]
 ) -> list[Number]:
-    """f of B f = tau for the columns of a square B, by elimination."""
-    n = len(wanted)
-    rows = [[column[i] for column in columns] for i in range(n)]
-    right, order = list(wanted), _order(ship)
+    """f of B f = tau for the rows of a square B, by elimination in an order of pivots."""
+    right = list(wanted)
     for k, (i, j) in enumerate(order):
         rows[i][j] = where(rows[i][j] == 0.0, NOTHING, rows[i][j])
         for m, _ in order[k + 1 :]:
             share = rows[m][j] / rows[i][j]
             rows[m] = [x - share * y for x, y in zip(rows[m], rows[i], strict=True)]
             right[m] = right[m] - share * right[i]
-    found: list[Number] = [0.0] * n
+    found: list[Number] = [0.0] * len(right)
     for k, (i, j) in reversed([*enumerate(order)]):
         known = sum_of([rows[i][other] * found[other] for _, other in order[k + 1 :]])
         found[j] = (right[i] - known) / rows[i][j]
@@ -203,15 +202,7 @@ def _least(
         [x * (1.0 + TINY) + NOTHING if i == j else x for j, x in enumerate(row)]
         for i, row in enumerate(rows)
     ]
-    right = list(wanted)
-    for k in n:
-        for i in range(k + 1, len(wanted)):
-            share = rows[i][k] / rows[k][k]
-            rows[i] = [x - share * y for x, y in zip(rows[i], rows[k], strict=True)]
-            right[i] = right[i] - share * right[k]
-    for k in reversed(n):
-        known = sum_of([rows[k][j] * right[j] for j in range(k + 1, len(wanted))])
-        right[k] = (right[k] - known) / rows[k][k]
+    right = _eliminated(rows, wanted, [(k, k) for k in n])
     return [w * sum_of([b[i] * right[i] for i in n]) for w, b in zip(weights, columns, strict=True)]
 
 
