@@ -31,7 +31,7 @@ def rms(x):
 def test_constant_force_moves_a_critically_damped_mass():
     run = replace(base(), tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
     t, T = base().time, FORGETTING
-    pushed = commands(clean(run), np.zeros(N)).response(Gains(np.eye(3)))
+    pushed = commands(clean(run), np.zeros(N)).response(Gains(np.eye(3), 0.0))
     expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
     np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
 
@@ -40,7 +40,7 @@ def test_pose_velocity_and_acceleration_belong_together():
     time = 100.0 + np.arange(N) * 0.02
     force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
     run = replace(base(), time=time, tau_cmd=force)
-    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(Gains(np.eye(3)))
+    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(Gains(np.eye(3), 0.0))
     for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
         between = np.diff(value, axis=0) / 0.02
         np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
@@ -50,7 +50,7 @@ def test_pose_velocity_and_acceleration_belong_together():
 def test_heading_turns_the_response():
     track = clean(replace(base(), tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
     ahead, aside = (
-        commands(track, np.full(N, psi)).response(Gains(np.eye(3))) for psi in (0.0, 0.5 * np.pi)
+        commands(track, np.full(N, psi)).response(Gains(np.eye(3), 0.0)) for psi in (0.0, 0.5 * np.pi)
     )
     for a, b in zip(ahead[:3], aside[:3], strict=True):
         np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
@@ -59,7 +59,7 @@ def test_heading_turns_the_response():
 def test_delayed_commands_have_a_delayed_response():
     track = clean(base())
     now, late = (
-        commands(track, np.zeros(N)).response(Gains(np.eye(3)), Lateness(by)) for by in (0.0, 0.5)
+        commands(track, np.zeros(N)).response(Gains(np.eye(3), 0.0), Lateness(by)) for by in (0.0, 0.5)
     )
     np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 

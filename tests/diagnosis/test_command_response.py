@@ -262,7 +262,7 @@ def test_gains_are_found_again_where_the_pose_is_the_response_alone():
     found = again.gains(Lateness(0.2), bent=True)
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == pytest.approx(0.4, abs=1e-5)
-    straight = r.commands.response(Gains(G), Lateness(0.2))
+    straight = r.commands.response(Gains(G, 0.0), Lateness(0.2))
     p = r.problem._replace(z=straight.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
     found = again.gains(Lateness(0.2))
@@ -371,7 +371,7 @@ def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, tim
     """Each by its own way; fitted is how late, and gains too large as a whole do not hide it."""
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     r = regression(jumping(hold=20, seed=4), psi=0.1 * TIME)
-    p = r.problem._replace(z=r.commands.response(Gains(size * G), Lateness(**{way: time})).eta)
+    p = r.problem._replace(z=r.commands.response(Gains(size * G, 0.0), Lateness(**{way: time})).eta)
     p = p._replace(sigma=np.full(3, 1e-3))
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
     assert likeliest_late(again, way, G) == pytest.approx(Lateness(**{way: time}))

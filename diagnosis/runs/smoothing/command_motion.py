@@ -104,7 +104,7 @@ class Gains(NamedTuple):
     """
 
     force: np.ndarray
-    bend: float = 0.0
+    bend: float
     slow: np.ndarray | float = 0.0
 
 
