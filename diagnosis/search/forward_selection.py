@@ -263,7 +263,7 @@ def taken_over(new: AcceptedEffect, old: AcceptedEffect, ship: Ship) -> Accepted
 
 
 def scored_by_id(ranking: Ranking, best: Shortlist) -> list[tuple[str, Scored]]:
-    """The scores of all candidates with their ids: those of the shortlist, as refined, then the others."""
+    """The scores of all candidates with their ids: the shortlist, as refined, then the others."""
     refined = [(best.ids[s.candidate], s) for s in best.scored]
     every = ((ranking.candidates[s.candidate].effect.id, s) for s in ranking.order)
     return [*refined, *((name, s) for name, s in every if name not in best.ids)]

@@ -82,7 +82,7 @@ def mended(
         if not believed and _as_stated(small, found.model, start):
             continue
         for large, more, own, is_finding in judged:
-            # Coefficients that are fitted with the larger one may explain an axis on which it has no force.
+            # Coefficients fitted with the larger one may explain an axis on which it has no force.
             shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE and own[k] > 0.0]
             mending = {small.id, large.id} & of_measurement
             if not (shown and is_finding) or mending == {large.id}:
