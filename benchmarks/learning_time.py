@@ -5,8 +5,7 @@ of 240 s at 50 Hz with a hidden drag, or those that are named. With ``--ship`` t
 from three runs of CyberShip Enterprise 1 and from three of that ship, each of 180 s at 10 Hz (times the
 scale of the ship) with a hidden drag. Times are of the processor, the last one is that of the wall.
 With ``--answers`` each state learns from one run of the Otter, or of that ship, of ten minutes at 10 Hz:
-the table has the time of the processor until each answer is there, imports included, and the remaining
-times that were stated over the true ones.
+the table has the time of the processor until each answer is there, imports included.
 """
 
 import argparse
@@ -23,7 +22,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 HERE = Path(__file__)
-LEAST_REST = 0.05  # 1, of the whole time: who waits for so little does not mind a factor of it
 SECONDS, SAMPLES, THINNED = 180.0, 1800, 5  # s; of each run; samples at 50 Hz in one at 10 Hz
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 # First words of the steps that `learn` tells -> part.
@@ -47,12 +45,6 @@ PARTS = {
 }
 
 ANSWERS = ["compare", "compare, wall", "compare, report", *(f"until answer {k}" for k in (1, 2, 3))]
-Stated = tuple[float, float]
-# Remaining time over the true one.
-REMAINING = [
-    "first remaining time",
-    *(f"{which}{half}" for half in ("", ", second half") for which in ("least", "most")),
-]
 
 
 def seconds() -> float:
@@ -63,7 +55,7 @@ def seconds() -> float:
 def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
     """Seconds of each part of one ``learn`` from runs of a ship, and of the whole."""
     begun, wall, found = seconds(), time.perf_counter(), {}
-    part, since, stated = "import", 0.0, list[Stated]()
+    part, since = "import", 0.0
 
     def close() -> None:
         nonlocal since
@@ -82,19 +74,8 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
             ),
             part,
         )
-        if remaining is not None:
-            remaining.begin(step)
-            if remaining.seconds is not None:
-                stated.append((since, remaining.seconds))
 
     from diagnosis import learn as command
-
-    try:
-        from diagnosis.execution.remaining_time import RemainingTime
-    except ImportError:  # an earlier state
-        remaining = None
-    else:
-        remaining = RemainingTime(seconds)
 
     with TemporaryDirectory() as folder:
         of = ["--ship", ship] if ship else []
@@ -103,25 +84,7 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
         for k, _ in enumerate(answers if isinstance(answers, Iterator) else [answers]):
             found[f"until answer {k + 1}"] = seconds()
     close()
-    found |= ratios(stated, since)
     return found | {"all": seconds() - begun, "wall": time.perf_counter() - wall}
-
-
-def ratios(stated: Sequence[Stated], end: float) -> dict[str, float]:
-    """Remaining times that were stated over the true ones.
-
-    The last LEAST_REST of the whole time is left out.
-
-    Args:
-        stated: times at which remaining times were stated, and these [s].
-        end: of the work [s].
-    """
-    each = [(at, left / (end - at)) for at, left in stated if end - at > LEAST_REST * end]
-    found = {"first remaining time": each[0][1]} if each else {}
-    for half, begin in (("", 0.0), (", second half", 0.5 * end)):
-        if of_part := [ratio for at, ratio in each if at >= begin]:
-            found |= {f"least{half}": min(of_part), f"most{half}": max(of_part)}
-    return found
 
 
 def compare(runs: Sequence[str], ship: str | None) -> dict[str, float]:
@@ -218,7 +181,7 @@ def main() -> None:
     print("| s |", " | ".join(found), "|")
     print("|---|", "|".join(["--:"] * len(found)), "|")
     parts = ["import", *PARTS.values(), "all", "wall"]
-    for part in [*ANSWERS, *REMAINING] if options.answers else dict.fromkeys(parts):
+    for part in ANSWERS if options.answers else dict.fromkeys(parts):
         print("|", part, "|", " | ".join(f"{each.get(part, 0.0):.1f}" for each in found.values()), "|")
     if len(found) > 1:
         whole = "compare" if options.answers else "all"

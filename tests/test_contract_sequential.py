@@ -193,7 +193,7 @@ def test_a_line_of_progress_makes_room_while_something_else_is_printed():
         stop=lambda: calls.append("stop"),
         start=lambda: calls.append("start"),
     )
-    line = ProgressLine(None, bar, None)
+    line = ProgressLine(None, bar)
 
     def fail():
         with line.paused():

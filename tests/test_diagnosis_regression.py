@@ -82,22 +82,6 @@ def test_a_fit_by_gram_matrices_is_direct_least_squares(table, candidate, number
     assert r.size(table.total) == pytest.approx(size, rel=1e-6)
 
 
-@pytest.mark.parametrize(("candidate", "number"), [(0, 0), (1, 0), (2, 0), (3, 0)])
-def test_beside_a_candidate_the_table_without_it_is_the_one_with_it(table, candidate, number):
-    alone = gram_table(Y, BLOCKS, [Candidate(None, [SHAPES[candidate][number]])], NUISANCE, SIGMA)
-    beside, of = score(table.with_effect(candidate, number), -1, 1), score(alone, 0, 1)
-    assert beside.blocks == pytest.approx(of.blocks, rel=1e-6)
-    assert beside.runs == pytest.approx(of.runs, rel=1e-6)
-    assert beside.prior == pytest.approx(of.prior, rel=1e-6)
-
-
-def test_the_order_in_which_candidates_are_taken_in_does_not_matter(table):
-    one = table.with_effect(2, 0).with_effect(1, 0)
-    other = table.with_effect(1, 0).with_effect(2, 0)
-    assert score(one, 0, 1).score == pytest.approx(score(other, 0, 1).score, rel=1e-6)
-    assert score(one, 0, 1).score != pytest.approx(score(table, 0, 1).score, rel=0.01)
-
-
 @pytest.mark.parametrize("candidate", [2, 3])
 @pytest.mark.parametrize("by_run", [False, True])
 def test_blocks_are_judged_by_fits_that_have_not_seen_them(table, by_run, candidate):

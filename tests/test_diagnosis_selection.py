@@ -1,7 +1,5 @@
 """From a measured run to the model error and to the effect that is missing."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from support.cases import slow
@@ -9,13 +7,11 @@ from support.cse1 import EFFECTS
 from support.measured import learn, sail, smoothed
 
 from diagnosis.predictors import Model, omega, weak_windows
-from diagnosis.predictors.weak_form import commanded, kernel, kernel_integral, kernel_moment
+from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
 from diagnosis.search import forward_selection
-from diagnosis.search.forward_selection import likely_effects
 from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
 from diagnosis.search.shortlist import LENGTH, NEW, novelty, rank, reweighted
-from diagnosis.search.significance import matters
 from diagnosis.verdict.confidence import probability
 
 
@@ -147,7 +143,6 @@ def test_coefficients_within_the_prior_are_no_finding():
 @pytest.mark.parametrize(("harm", "found"), [([True, False, True], 2), ([True, True], 0)])
 def test_an_effect_that_harms_alone_stays_with_the_next_or_goes(monkeypatch, harm, found):
     """One of two causes may harm the runs in which the other acts most, and both together do not."""
-    monkeypatch.setattr(forward_selection, "likely_effects", lambda *_: 2)  # it asks for harm, too
     told = iter(harm)
     monkeypatch.setattr(forward_selection, "harmful", lambda *_: next(told, True))
     pair = {"ship": {"delta_X_u": -3.0}, "thrusters": {"loss_yaw": 0.3}}
@@ -205,21 +200,3 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     assert new["curve_vsp_y(c)"]
     assert {step.candidates[j.candidate].effect.id for j in step.order} == {e for e in new if new[e]}
     assert all(novelty(step.table, k, 0) == 1.0 for k in range(len(new))), "beside nothing all is new"
-
-
-@pytest.mark.parametrize(
-    "hidden",
-    [
-        {},
-        pytest.param({"delta_X_u": -2.0}, marks=pytest.mark.quick),
-        {"delta_X_u": -2.0, "delta_N_r": -1.5},
-    ],
-)
-def test_as_many_effects_are_likely_as_there_are(hidden):
-    start, windows = Model(), data(64.0, ship=hidden)[0]
-    belief = NominalPrior.of(start, None, MEASURED)
-    t, at = TrainingSet([windows], None, belief), RefinedModel.at(start, belief)
-    ranking = rank(t, at, set())
-    shows = partial(matters, ranking.base, command=commanded([windows], start))
-    assert likely_effects(ranking, start, shows) == len(hidden)
-    assert likely_effects(ranking, start, lambda without, left: False) == 0

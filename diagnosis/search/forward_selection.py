@@ -13,7 +13,7 @@ One of two causes, alone, may well do harm where the other acts most: an effect 
 harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -25,13 +25,11 @@ from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import commanded
-from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
 from .effect_evidence import nearest_share
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
-from .gram import Entry, GramTable, charge_of
-from .map_regression import Scored, first_share, fitted_columns, score
-from .most_likely import ridge
+from .gram import charge_of
+from .map_regression import Scored, first_share
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
@@ -39,19 +37,16 @@ from .refinement import (
     CandidateStart,
     RefinedModel,
     TrainingSet,
-    bounded,
     has_values_of_runs,
     nuisance_of,
     refine,
     refit,
 )
 from .shortlist import (
-    LENGTH,
     NEW,
     MadeCandidates,
     Ranking,
     Shortlist,
-    in_order,
     leads,
     of_one_value,
     rank,
@@ -108,18 +103,17 @@ def search(
     """All effects that a regression finds; arguments as of :class:`.methods.Method`."""
     belief = NominalPrior.of(start, prior, MEASURED)
     t, at = TrainingSet(data, None, belief), RefinedModel.at(start, belief)
-    advance("every effect as a candidate")
+    lacking = t.error(at)
+    shows = partial(matters, lacking, command=commanded(data, start))
     made: MadeCandidates = {}
-    ranking = rank(t, at, set(), made, of_each_run=True)
-    lacking, command = ranking.base, commanded(data, start)
-    shows = partial(matters, lacking, command=command)
-    likely = likely_effects(ranking, start, shows)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     gone: set[str] = set()  # effects that others have made superfluous
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
-    turn = "effect 1"
     for _ in range(MOST_REPORTED):  # those that give way count, else all come and go where none explains
+        turn = f"effect {len(accepted) + 1}"
+        advance(f"{turn}: every effect as a candidate")
+        ranking = rank(t, at, gone | {p.id for p in accepted}, made, of_each_run=True)
         advance(f"{turn}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
@@ -150,12 +144,6 @@ def search(
         if len(accepted) > 1 and before is None:
             at, accepted, removed = searched_again(t, at, accepted, made, advance, rng)
             gone |= removed
-        turn = f"effect {len(accepted) + 1}"
-        advance(f"{turn}: every effect as a candidate")
-        ranking = rank(t, at, gone | {p.id for p in accepted}, made, of_each_run=True)
-        if likely > len(accepted):
-            likely = min(likely, len(accepted) + likely_effects(ranking, start, shows))
-        turn = f"{turn}, about {likely} likely"
     if before is not None:
         t, at = before
         del accepted[-1]
@@ -303,81 +291,3 @@ def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ran
         return Ranked(name, s.score, q2, beyond, s.score - first.score, float(std))
 
     return [ranked(name, s) for name, s in in_order]
-
-
-def likely_effects(
-    ranking: Ranking, start: Model, shows: Callable[[np.ndarray, np.ndarray], bool]
-) -> int:
-    """The number of effects (0 to MOST_REPORTED) that regressions accept one after the other.
-
-    Only the remaining time of a search is stated by it: the effects are linear in their parameters, and
-    none is accepted or rejected here.
-
-    Args:
-        ranking: all candidates.
-        start: the initial model, which has the ranges of the values.
-        shows: :func:`.significance.matters` of this search, by the model errors without an effect and
-            with it (K, 3).
-    """
-    table, used, on_trial = ranking.table, list[int](), False
-    while len(used) < MOST_REPORTED:
-        gram = _without(table, table.total, table.nuisance, table.precision)
-        falls = [
-            (_fall(table, gram, shape, entry, start), k)
-            for k, candidate in enumerate(ranking.candidates)
-            if k not in used
-            for shape, entry in zip(candidate.shapes, table.entries[k], strict=True)
-        ]
-        best = dict.fromkeys(k for fall, k in sorted(falls, reverse=True) if fall > NEW)
-        shapes = {k: len(ranking.candidates[k].shapes) for k in [*best][:LENGTH]}
-        if not shapes:
-            break
-        first = in_order([score(table, *each) for each in shapes.items()])[0]
-        nothing = score(table, -1, 1)
-        # What a fit leaves is orthogonal to the force of the effect.
-        force = _force(table, first, ranking.candidates[first.candidate].shapes[first.shape])
-        harms = harmful(nothing, first)
-        if not (shows(force, np.zeros_like(force)) and beyond_chance(nothing, first, ranking.size)):
-            break
-        if harms and on_trial:
-            break
-        used.append(first.candidate)
-        on_trial = harms
-        table = table.with_effect(first.candidate, first.shape)
-    return len(used) - on_trial
-
-
-def _force(t: GramTable, scored: Scored, shape: CandidateShape) -> np.ndarray:
-    """(K, 3), the force of an effect that is fitted together with all nuisance parameters."""
-    columns = t.entries[scored.candidate][scored.shape].columns
-    beta = fitted_columns(t, scored.candidate, scored.shape)
-    force = shape.columns @ np.array([beta.get(k, 0.0) for k in columns])
-    return force if shape.offset is None else force + shape.offset
-
-
-def _fall(t: GramTable, gram: np.ndarray, shape: CandidateShape, entry: Entry, start: Model) -> float:
-    """What a shape takes off the sum of squares, less its charge; -inf: its values are out of range."""
-    given, columns = entry.given, entry.columns
-    right, fall = gram[columns, 0], -(len(columns) + entry.nonlinear) * t.per_parameter - entry.quieted
-    if given >= 0:
-        right = right - gram[columns, given]
-        fall += 2.0 * gram[given, 0] - gram[given, given]
-    if columns:
-        values = np.linalg.solve(_regular(t, gram, columns, entry.precision), right)
-        fall += right @ values
-        for name, value in zip(shape.fitted, values.tolist(), strict=True):
-            whole = shape.given.get(name, 0.0) + value
-            if bounded(start, name, whole) != whole:
-                return -np.inf
-    return float(fall) if np.isfinite(fall) else -np.inf
-
-
-def _regular(t: GramTable, gram: np.ndarray, columns: list[int], precision: np.ndarray) -> np.ndarray:
-    own = gram[np.ix_(columns, columns)] + precision
-    return own + ridge(own, t.unit[columns])
-
-
-def _without(t: GramTable, gram: np.ndarray, columns: list[int], precision: np.ndarray) -> np.ndarray:
-    """A Gram matrix (p, p) of what some columns, fitted, do not explain of all."""
-    own = _regular(t, gram, columns, precision)
-    return np.asarray(gram - gram[:, columns] @ np.linalg.solve(own, gram[columns]))

@@ -6,12 +6,11 @@ the data themselves.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
@@ -114,23 +113,6 @@ class GramTable:
     def _folds(self, number: np.ndarray) -> Folds:
         held = [np.flatnonzero(number == n) for n in np.unique(number)]
         return Folds(held, np.stack([self.total - self.grams[k].sum(axis=0) for k in held]))
-
-    def with_effect(self, candidate: int, shape: int) -> "GramTable":
-        """The table beside a model that has a candidate: its parameters are nuisance parameters."""
-        taken = self.entries[candidate][shape]
-        grams = self.grams
-        if taken.given >= 0:
-            grams = grams.copy()  # what is given is taken off the model error
-            grams[:, :, 0] -= grams[:, :, taken.given]
-            grams[:, 0, :] -= grams[:, taken.given, :]
-        moved = taken.offset - self.entries[-1][0].offset
-        entries = [
-            [e._replace(offset=np.concatenate([e.offset + moved, taken.start])) for e in shapes]
-            for shapes in self.entries
-        ]
-        precision = np.asarray(block_diag(self.precision, taken.precision))
-        nuisance = [*self.nuisance, *taken.columns]
-        return replace(self, grams=grams, entries=entries, nuisance=nuisance, precision=precision)
 
     @property
     def per_parameter(self) -> float:

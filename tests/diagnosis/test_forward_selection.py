@@ -5,176 +5,31 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from support.measured import sail, smoothed
 
 from diagnosis import Model
-from diagnosis.predictors.weak_form import OVERLAP, weak_windows
+from diagnosis.predictors.weak_form import weak_windows
 from diagnosis.search import forward_selection
-from diagnosis.search.candidates import Candidate, CandidateShape
+from diagnosis.search.candidates import Candidate
 from diagnosis.search.conclusion import AcceptedEffect
 from diagnosis.search.findings import MOST_REPORTED, Finding, Findings, Ranked
 from diagnosis.search.forward_selection import (
     ForwardSelection,
-    _fall,
-    _force,
-    _without,
     accepted_effect,
     in_one_order,
-    likely_effects,
     searched_again,
 )
-from diagnosis.search.gram import Nuisance, gram_table
-from diagnosis.search.map_regression import REPLICATES, Scored, first_share, score
-from diagnosis.search.shortlist import Ranking
+from diagnosis.search.gram import Nuisance
+from diagnosis.search.map_regression import REPLICATES, Scored, first_share
 
-K, BLOCK = 240, 12
-SIGMA = np.array([0.5, 2.0, 0.1])
-BLOCKS = np.column_stack([np.zeros(K, int), np.arange(K) // BLOCK])
-WEIGHT = (1.0 / SIGMA / np.sqrt(OVERLAP))[:, None]
+K = 240
 
 
 def drawn(*shape, seed=0):
     return np.random.default_rng(seed).standard_normal(shape)
 
 
-def shape(columns, fitted=("a", "b"), offset=None, given=(), **others):
-    return CandidateShape(dict(given), fitted, offset, columns, np.ones(columns.shape[2]), **others)
-
-
 NUISANCE = Nuisance(drawn(K, 3, 2, seed=4), np.diag([0.0, 1.0]), np.zeros(2), np.ones(2))
-
-
-def table_of(y, *shapes):
-    effects = [Candidate(SimpleNamespace(id=f"e{k}"), [s]) for k, s in enumerate(shapes)]
-    table = gram_table(y, BLOCKS, effects, NUISANCE, SIGMA)
-    order = [score(table, k, 1) for k in range(len(shapes))]
-    return Ranking(y, NUISANCE, table, effects, sorted(order, key=lambda s: s.score))
-
-
-def scaled(columns):
-    """Columns (K, 3, p) in units of the noise, all rows one below the other."""
-    return (WEIGHT * columns).reshape(3 * K, -1)
-
-
-@settings(max_examples=5, deadline=None)
-@given(st.integers(0, 1000))
-def test_a_gram_matrix_without_columns_is_that_of_what_they_do_not_explain(seed):
-    rng = np.random.default_rng(seed)
-    t = table_of(rng.standard_normal((K, 3)), shape(rng.standard_normal((K, 3, 2)))).table
-    A = scaled(rng.standard_normal((K, 3, 5)))
-    gram = A.T @ A
-    found = _without(t, gram, [3, 4], np.zeros((2, 2)))
-    left = A - A[:, 3:] @ np.linalg.lstsq(A[:, 3:], A, rcond=None)[0]
-    assert found == pytest.approx(left.T @ left, rel=1e-5, abs=1e-5 * np.abs(gram).max())
-
-
-@pytest.mark.parametrize("given_force", [False, True])
-@pytest.mark.parametrize("prior", [0.0, 30.0])
-def test_a_fall_is_what_an_effect_takes_off_the_error_beyond_the_nuisance_less_its_charge(
-    given_force, prior, monkeypatch
-):
-    monkeypatch.setattr(forward_selection, "bounded", lambda *args: args[-1])
-    columns, offset = drawn(K, 3, 2, seed=1), 0.3 * drawn(K, 3, seed=2)
-    y = columns @ [1.0, -2.0] + NUISANCE.columns @ [0.5, 0.2] + drawn(K, 3, seed=3)
-    y = y + offset if given_force else y
-    one = shape(
-        columns,
-        offset=offset if given_force else None,
-        given={"c": 1.0} if given_force else {},
-        precision=prior * np.eye(2),
-        quieted=0.7 * OVERLAP * SIGMA**2,
-    )
-    t = table_of(y, one).table
-    gram = _without(t, t.total, t.nuisance, t.precision)
-    (entry,) = t.entries[0]
-    found = _fall(t, gram, one, entry, None)
-    Z, X, z = scaled(NUISANCE.columns), scaled(columns), scaled(y[..., None])[:, 0]
-    target = z - scaled(offset[..., None])[:, 0] if given_force else z
-
-    def off(a):
-        return a - Z @ np.linalg.solve(Z.T @ Z + NUISANCE.precision, Z.T @ a)
-
-    # With a prior of the nuisance the rest is not the square of a residual, but a product.
-    fall = z @ off(z) - target @ off(target)
-    inner = X.T @ off(X) + prior * np.eye(2)
-    right = X.T @ off(target)
-    fall += right @ np.linalg.solve(inner, right)
-    charge = (3.0 if given_force else 2.0) * t.per_parameter + 3.0 * 0.7
-    assert found == pytest.approx(fall - charge, rel=1e-4)
-    monkeypatch.setattr(forward_selection, "bounded", lambda _, name, value: min(value, 0.5))
-    assert _fall(t, gram, one, entry, None) == -np.inf, "beyond a limit"
-
-
-def test_a_whole_value_is_that_which_is_given_and_what_is_fitted(monkeypatch):
-    seen = {}
-
-    def note(_, name, value):
-        seen[name] = value
-        return value
-
-    monkeypatch.setattr(forward_selection, "bounded", note)
-    columns, offset = drawn(K, 3, 1, seed=1), drawn(K, 3, seed=2)
-    one = shape(columns, ("a",), offset, {"a": 0.7})
-    t = table_of(offset + columns @ [0.25] + 1e-3 * drawn(K, 3, seed=5), one).table
-    _fall(t, _without(t, t.total, t.nuisance, t.precision), one, t.entries[0][0], None)
-    assert seen["a"] == pytest.approx(0.95, abs=0.01)
-
-
-@pytest.mark.parametrize("given_force", [False, True])
-def test_the_force_of_an_effect_is_that_of_its_values(given_force):
-    columns, offset = drawn(K, 3, 2, seed=1), drawn(K, 3, seed=2)
-    one = shape(columns, offset=offset if given_force else None)
-    force = columns @ [1.0, -2.0] + (offset if given_force else 0.0)
-    ranking = table_of(force + NUISANCE.columns @ [0.3, 0.0], one)
-    found = _force(ranking.table, ranking.order[0], one)
-    assert found == pytest.approx(force, abs=1e-4)
-
-
-# How many effects are likely
-
-
-def count(y, *shapes, shows=lambda without, left: True):
-    ranking = table_of(y, *shapes)
-    return likely_effects(ranking, None, shows)
-
-
-@pytest.mark.parametrize("effects", [0, 1, 2, 3])
-def test_as_many_effects_are_likely_as_the_error_has(effects, monkeypatch):
-    monkeypatch.setattr(forward_selection, "bounded", lambda *args: args[-1])
-    shapes = [shape(drawn(K, 3, 1, seed=10 + k), ("a",)) for k in range(4)]
-    y = SIGMA * drawn(K, 3, seed=9)
-    for s in shapes[:effects]:
-        y = y + 3.0 * SIGMA * s.columns[..., 0]
-    assert count(y, *shapes) == effects
-    assert count(y, *shapes, shows=lambda without, left: False) == 0
-    assert count(y, *shapes[:1], *shapes[:1]) == min(effects, 1), "what is there already is no other one"
-    monkeypatch.setattr(forward_selection, "bounded", lambda *_: 1e9)
-    assert count(y, *shapes) == 0, "out of their ranges"
-
-
-def test_no_more_effects_are_likely_than_are_reported(monkeypatch):
-    monkeypatch.setattr(forward_selection, "bounded", lambda *args: args[-1])
-    shapes = [shape(drawn(K, 3, 1, seed=10 + k), ("a",)) for k in range(MOST_REPORTED + 2)]
-    y = SIGMA * drawn(K, 3, seed=9)
-    for s in shapes:
-        y = y + 3.0 * SIGMA * s.columns[..., 0]
-    assert count(y, *shapes) == MOST_REPORTED
-
-
-@pytest.mark.parametrize(
-    ("harms", "likely"), [([True], 0), ([True, False], 2), ([True, True], 0), ([False, True], 1)]
-)
-def test_an_effect_that_harms_is_likely_only_with_the_next_one(harms, likely, monkeypatch):
-    monkeypatch.setattr(forward_selection, "bounded", lambda *args: args[-1])
-    answers = iter([*harms, *[False] * 9])
-    monkeypatch.setattr(forward_selection, "harmful", lambda *_: next(answers))
-    shapes = [shape(drawn(K, 3, 1, seed=10 + k), ("a",)) for k in range(len(harms))]
-    y = SIGMA * drawn(K, 3, seed=9)
-    for s in shapes:
-        y = y + 3.0 * SIGMA * s.columns[..., 0]
-    assert count(y, *shapes) == likely
 
 
 # What is reported of candidates
