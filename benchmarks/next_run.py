@@ -40,8 +40,8 @@ from diagnosis.design import (
 from diagnosis.predictors import WeakWindows, ship_with
 from diagnosis.predictors.parameter_set import write_model
 from diagnosis.predictors.weak_form import commanded
+from diagnosis.runs.run_constants import LEVEL
 from diagnosis.search.candidates import SMALL, model_error
-from diagnosis.search.most_likely import LEVEL
 from studies.study_command import progress
 
 from .hidden_effects.draw import LARGEST, SMALLEST

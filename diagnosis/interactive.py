@@ -33,7 +33,7 @@ from .report.report_data import ReportData
 from .report.terminal import as_text, show_calibration, show_comparison, summary
 from .runs import Run, read_frame, ship_of_logs
 from .search import DEFAULT, Method, Prior, shares
-from .verdict.pruning_criteria import USUAL as PAIRED
+from .verdict.pruning_criteria import PAIRED
 
 if TYPE_CHECKING:
     from typing import TypeAlias

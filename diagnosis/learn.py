@@ -34,8 +34,7 @@ from .commands.command_line import (
 from .execution.progress import Advance
 from .execution.result_folder import together
 from .search.methods import DEFAULT, METHODS, method
-from .verdict.pruning_criteria import CRITERIA, criterion
-from .verdict.pruning_criteria import USUAL as PAIRED
+from .verdict.pruning_criteria import CRITERIA, PAIRED, criterion
 
 if TYPE_CHECKING:
     from .session import Session

@@ -44,7 +44,7 @@ from .search.significance import Losses
 from .verdict.judging import DecidedFindings, judge
 from .verdict.measured_commands import are_measured, with_measured_commands
 from .verdict.prediction_gain import PredictionGain, prediction_gain
-from .verdict.pruning_criteria import USUAL, Harm, criterion
+from .verdict.pruning_criteria import PAIRED, Harm, criterion
 from .verdict.validation_data import ValidationData
 
 
@@ -386,7 +386,7 @@ def begin(
     seed: int = 0,
     by: str | Method = DEFAULT,
     validate: Sequence[WeakWindows] = (),
-    pruning: str = USUAL,
+    pruning: str = PAIRED,
 ) -> Session:
     """Check what is given, before any work; arguments as of :func:`diagnosis.diagnose`, of loaded runs.
 

@@ -13,6 +13,7 @@ from diagnosis.assessment.command_check import beyond_thrusters, idle, lasting
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.thrust import full_thrust
+from diagnosis.runs.run_constants import NEGLIGIBLE
 
 MODEL = Model()
 FULL = full_thrust(MODEL).tolist()
@@ -31,7 +32,7 @@ def expected(ratios):
     for k, full in enumerate(FULL):
         cells = [abs(row[k]) * full for row in ratios]
         false = [c for c in cells if c > SETTINGS.most_gain * full]
-        if false and sum(false) > SETTINGS.negligible * sum(cells):
+        if false and sum(false) > NEGLIGIBLE * sum(cells):
             told.append((max(cells) / full, k, len(false)))
     return max(told)[1:] if told else None
 

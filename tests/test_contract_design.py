@@ -142,7 +142,7 @@ def test_a_ship_that_allocates_is_asked_a_force_ahead_and_a_moment():
     assert found.high.tolist() == [4.5, 0.0, 0.0]
     assert found.low.tolist() == [-4.5, 0.0, 0.0]
     assert found.rudder.tolist() == [0.0, 0.0, 0.75]
-    share = order_library.usable_thrust()
+    share = order_library.USABLE_THRUST
     more = Orders.of(model, data, 100.0)
     assert more.high[0] == pytest.approx(share * 10.0)
     assert more.rudder[2] == pytest.approx(0.5 * share * 4.0)

@@ -11,7 +11,7 @@ from cosim.trials import Passage
 from diagnosis.assessment import trial_errors
 from diagnosis.design import designing
 from diagnosis.design.designing import Designer, ScoredPlan
-from diagnosis.design.manoeuvre_library import LIBRARY, USUAL, PlanStep
+from diagnosis.design.manoeuvre_library import LIBRARY, USUAL_MANOEUVRES, PlanStep
 from diagnosis.design.order_library import ORDERS, USUAL_ORDERS
 from diagnosis.search import candidates
 from diagnosis.search.nonlinear import profile
@@ -68,7 +68,7 @@ def test_simulated_tracks_are_searched_many_at_once():
     assert best.steps[0].name in ORDERS
     assert [*d.library] == [*ORDERS]
     assert d.usual_runs is USUAL_ORDERS
-    assert Designs(by_first).usual_runs is USUAL
+    assert Designs(by_first).usual_runs is USUAL_MANOEUVRES
 
 
 def test_a_search_ends_with_its_time(monkeypatch):
@@ -185,7 +185,7 @@ def profiled(monkeypatch, best, size, present, start=1.0, rough=("radius",)):
 def test_a_profile_has_the_best_value_and_where_the_cost_rises(monkeypatch):
     model, intervals, _tried = profiled(monkeypatch, 2.2, 0.1, 2.0)
     assert model.values["radius"] + 1.0 == pytest.approx(2.2, abs=1e-3)
-    half = 0.1 * np.sqrt(profile.rise())
+    half = 0.1 * profile.Z95
     low, high = intervals["radius"]
     assert (low + 1.0, high + 1.0) == (
         pytest.approx(2.2 - half, abs=2e-3),

@@ -11,6 +11,7 @@ from scipy.stats import norm
 from diagnosis.assessment.gains import ThrustGains, _own
 from diagnosis.assessment.residual import recurrence as recurrences
 from diagnosis.assessment.settings import SETTINGS
+from diagnosis.runs.run_constants import NEGLIGIBLE
 from diagnosis.search.conclusion import interval, laplace_std, suspected
 from diagnosis.search.gram import (
     Nuisance,
@@ -20,7 +21,7 @@ from diagnosis.search.gram import (
     noise,
     run_folds,
 )
-from diagnosis.search.most_likely import beyond, ridge, rise
+from diagnosis.search.most_likely import beyond, ridge
 from diagnosis.search.significance import Losses, gain, harm, predicts_worse
 from fmus.declare import Range, Variable
 from fmus.scale import REFERENCE
@@ -162,7 +163,7 @@ def test_a_command_with_an_amplitude_for_each_stretch_is_compared_with_a_force_f
         left = error - X @ np.linalg.lstsq(X, error, rcond=None)[0]
         return 1.0 - left @ left / (error @ error)
 
-    expected = explained(command) > max(*map(explained, others), always) + SETTINGS.negligible
+    expected = explained(command) > max(*map(explained, others), always) + NEGLIGIBLE
     assert recurrences._in_part(error, command, others, stretch, always) == expected
     assert not recurrences._in_part(0.0 * error, command, others, stretch, 0.0)
 
@@ -222,7 +223,6 @@ def test_a_command_has_for_its_own_what_a_regression_on_the_others_leaves(seed, 
 
 @pytest.mark.parametrize("places", [0, 1, 3, 40])
 def test_limits_of_one_and_of_several_normal_values(places):
-    assert rise() == pytest.approx(norm.ppf(0.975) ** 2)
     chance = 0.01 / max(places, 1)
     assert beyond(places) == pytest.approx(norm.ppf(1.0 - chance / 2.0))
     assert interval(3.0, 0.5) == pytest.approx((3.0 - 0.98, 3.0 + 0.98), abs=1e-3)

@@ -46,7 +46,7 @@ from diagnosis.assessment.readings import (
     swapped,
 )
 from diagnosis.assessment.settings import SETTINGS
-from diagnosis.predictors import ship_with
+from diagnosis.predictors import ship_with, uncertainty
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs import line_beside, propose
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
@@ -145,7 +145,7 @@ def test_the_unit_of_a_column_does_not_matter():
 def test_a_current_that_may_explain_an_error_is_that_of_the_ships_size(name):
     """A small share of a speed that grows with the root of the length (Froude)."""
     model = Model(ship=ship_with((), name))
-    speed = SETTINGS.inexact * np.sqrt(model.ship.description.length / 1.105)
+    speed = uncertainty.MEASURED * np.sqrt(model.ship.description.length / 1.105)
     currents = [(m.value("V_n"), m.value("V_e")) for m in in_further_current(model)]
     np.testing.assert_allclose(currents, speed * np.eye(2), rtol=1e-3)
 

@@ -10,18 +10,17 @@ from scipy.stats import chi2
 
 from diagnosis import Model
 from diagnosis.assessment.residual.remainder import (
+    CHANCE_OF_ONE,
+    SPAN,
     axis_remainders,
     chance,
-    level,
     noise_freedom,
-    span_windows,
     spans,
 )
-from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
 from diagnosis.predictors.weak_form import EVERY, OVERLAP
+from diagnosis.runs.run_constants import NEGLIGIBLE
 
-SPAN = span_windows()
 K, NOISE = 100 * SPAN, 0.02
 
 
@@ -60,7 +59,7 @@ def test_noise_is_no_remainder(seed):
     for found in left(noise(seed=seed)).values():
         assert not found.significant
         assert not found.beyond_chance
-        assert found.p_value > 10.0 * level()
+        assert found.p_value > 10.0 * CHANCE_OF_ONE
         assert found.uncertainty == pytest.approx(NOISE)
         assert found.rms == pytest.approx(NOISE, rel=0.1)
 
@@ -126,7 +125,7 @@ def test_a_force_that_changes_sign_from_span_to_span_lasts_too():
 
 
 @pytest.mark.parametrize(
-    ("before", "command"), [(0.02 / SETTINGS.negligible, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
+    ("before", "command"), [(0.02 / NEGLIGIBLE, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
 )
 def test_what_is_little_beside_the_first_error_or_the_command_does_not_matter(before, command):
     after = noise()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csc_matrix
 
 from diagnosis.predictors.weak_form import OVERLAP
-from diagnosis.search.most_likely import rise
+from diagnosis.runs.cleaning import Z95
 from diagnosis.search.nonlinear.interval_sums import IntervalSums
 from diagnosis.search.nonlinear.segmentation import (
     RunCells,
@@ -183,7 +183,7 @@ def test_likely_ends_are_those_whose_cost_is_within_the_quantile():
         for place, within in ((at[0], False), (at[0] + 1, True), (at[1] - 1, True), (at[1], False)):
             trial = [list(s) for s in best]
             trial[k][end] = place
-            assert (p.cost([tuple(s) for s in trial]) <= p.cost(best) + rise()) == within
+            assert (p.cost([tuple(s) for s in trial]) <= p.cost(best) + Z95**2) == within
 
 
 @pytest.mark.parametrize(("most", "lasting"), [(1, False), (2, False), (1, True)])

@@ -31,6 +31,7 @@ from diagnosis.assessment.stability import (
     sampled_motions,
 )
 from diagnosis.predictors import Model, ship_with
+from diagnosis.predictors.uncertainty import MEASURED
 from diagnosis.predictors.weak_form import acceleration
 from diagnosis.runs.cleaning import BRIEF
 from fmus.declare import variables
@@ -110,7 +111,7 @@ def test_the_damping_of_a_described_ship_and_its_changes_count():
 
 @pytest.mark.parametrize("before", [2.0, -2.0])
 def test_less_is_less_by_more_than_a_share_of_what_was_before(before):
-    share = 2.0 * SETTINGS.inexact**2
+    share = 2.0 * MEASURED**2
     found = stability._less(before + share * np.array([1.1, -0.9, -1.1]), before)
     assert found.tolist() == [False, False, True]
 

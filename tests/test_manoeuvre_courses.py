@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from diagnosis.design.manoeuvre_library import (
     DIMENSIONS,
     LIBRARY,
-    USUAL,
+    USUAL_MANOEUVRES,
     PlanStep,
     Reach,
     moved,
@@ -222,7 +222,7 @@ def test_a_plan_is_its_manoeuvres_in_their_headings_with_turns_between():
     assert np.abs(np.diff(whole[:, 2])).max() <= 0.1 * 0.7 * 0.2 * 1.01
     straight = poses([p._replace(heading=0.5) for p in parts], 200.0, 0.1, REACH)
     assert straight[:, 2] == pytest.approx(0.5), "without another heading there is no turn"
-    for name, runs in USUAL.items():
+    for name, runs in USUAL_MANOEUVRES.items():
         plan = usual(name, 90.0)
         assert [(s.name, s.numbers) for s in plan] == list(runs)
         assert sum(s.seconds for s in plan) == 90.0

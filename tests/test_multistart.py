@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.search.nonlinear.multistart import (
-    FAR,
     POINTS,
+    WIDEST,
     Landscape,
     best_values,
     limits,
@@ -60,7 +60,7 @@ def test_what_is_tried_is_spread_over_the_limits(share, low, width):
     p = variable("a", low, low + width)
     found = plain(p).within(p, share)
     ratio = (low + width) / low if low > 0.0 else 1.0
-    expected = low * ratio**share if ratio > FAR**2 else low + share * width
+    expected = low * ratio**share if ratio > WIDEST**2 else low + share * width
     assert found == pytest.approx(expected)
     assert limits(p) == (low, low + width)
     wide = variable("a", 0.01, 10.0)
@@ -71,7 +71,7 @@ def test_what_is_tried_is_spread_over_the_limits(share, low, width):
 def test_without_limits_values_are_the_sparser_the_further_to_both_sides(share, start):
     p, of = variable("a"), plain(variable("a"), values={"a": start})
     ends = [of.within(p, s) for s in (0.0, 0.5, 1.0)]
-    assert ends == pytest.approx([start - FAR * start, start, start + FAR * start])
+    assert ends == pytest.approx([start - WIDEST * start, start, start + WIDEST * start])
     up, down = of.within(p, 0.5 + 0.5 * share), of.within(p, 0.5 - 0.5 * share)
     assert up - start == pytest.approx(start - down, abs=1e-9)
     further = of.within(p, 0.5 + 0.25 * share) - start

@@ -12,7 +12,6 @@ from support.reported import diagnosis, effect, ranked, report_data
 from diagnosis import Model
 from diagnosis.assessment.covariates import HEADING, SPEED
 from diagnosis.assessment.regions import Profile
-from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.evaluation import PredictionError
 from diagnosis.predictors.windows import WindowErrors
 from diagnosis.report import finding_text, formatting, headline, terminal
@@ -21,6 +20,7 @@ from diagnosis.report.pictures.shape import Curve
 from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.report.terminal import _number as terminal_number
 from diagnosis.report.terminal import _percent as terminal_percent
+from diagnosis.runs.run_constants import CHANCE
 from fmus.ship import ship
 
 # Numbers and sentences
@@ -438,7 +438,7 @@ def test_a_curve_has_the_values_of_its_effect_and_covers_98_percent_of_the_data(
     for bound, at in zip(curve.sure, ci95 or (value, value), strict=True):
         np.testing.assert_allclose(bound, at * curve.x**3, atol=1e-9)
     low, high = curve.covered
-    share = SETTINGS.chance * data.size  # of each tail
+    share = CHANCE * data.size  # of each tail
     assert abs(np.sum(data < low) - share) <= 1
     assert abs(np.sum(data > high) - share) <= 1
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from unittest.mock import patch
 
+from diagnosis.runs.run_constants import LEVEL
 from diagnosis.search.effect_evidence import EffectEvidence
-from diagnosis.search.most_likely import LEVEL
 from diagnosis.verdict import confidence
 
 from ..hidden_effects.results import BETWEEN

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, omega, weak_windows
 from ..predictors.thrust import full_thrust
+from ..predictors.uncertainty import MEASURED
 from ..predictors.weak_form import BLOCK, inertial, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU, Named
@@ -22,10 +23,10 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     full, size = full_thrust(model), np.abs(run.tau_cmd)
     beyond = size > SETTINGS.most_gain * full
     share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
-    if share.max() <= SETTINGS.negligible:
+    if share.max() <= NEGLIGIBLE:
         return None
     ratio = size.max(axis=0) / np.maximum(full, np.finfo(float).tiny)
-    k = int(np.argmax(np.where(share > SETTINGS.negligible, ratio, 0.0)))
+    k = int(np.argmax(np.where(share > NEGLIGIBLE, ratio, 0.0)))
     rows, unit = int(beyond[:, k].sum()), "N.m" if k == 2 else "N"
     seen = (
         f"{TAU[k]} reaches {size[:, k].max():.4g} {unit}, more than {SETTINGS.most_gain:g} times "
@@ -46,7 +47,7 @@ def _beyond_limits(commands: np.ndarray, time: np.ndarray, model: Model) -> str 
     for k, ((name, unit), limit) in enumerate(zip(form.items(), limits, strict=True)):
         most, size = float(np.abs(limit).max()), np.abs(commands[:, k])
         beyond = size > SETTINGS.most_gain * most
-        if (layout.round and layout.round[k]) or beyond.mean() <= SETTINGS.negligible:
+        if (layout.round and layout.round[k]) or beyond.mean() <= NEGLIGIBLE:
             continue
         first = int(np.argmax(beyond))
         why = "its unit changes there" if size[:first].any() else "it is in another unit"
@@ -89,12 +90,12 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     z, inertia = needed_force(w, model), inertial(w, model)
     size = np.sqrt((z**2).mean(axis=0))
     # Both inertia and hull may be inexact.
-    uncertain = 2.0 * SETTINGS.inexact * np.sqrt((inertia**2 + (z - inertia) ** 2).mean(axis=0))
+    uncertain = 2.0 * MEASURED * np.sqrt((inertia**2 + (z - inertia) ** 2).mean(axis=0))
     if constant_commands(run):
         return _varying(w, model, uncertain)
     for k in np.flatnonzero(~varies):
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
-        follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
+        follows = (z[:, k] * given > 0.0).mean() >= NEGLIGIBLE
         opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
         if opposed and abs(given) > DIGITS * largest:
             return (

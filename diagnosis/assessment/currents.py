@@ -3,15 +3,15 @@
 import numpy as np
 
 from ..predictors import Model, WeakWindows, omega
+from ..predictors.uncertainty import MEASURED
 from ..runs.run_constants import STEPS
-from .settings import SETTINGS
 
 CURRENT = ("V_n", "V_e")  # parameters of a current to the north and to the east [m/s]
 
 
 def usual_current(model: Model) -> float:
     """Deviation [m/s] of a current of the ship's size."""
-    return SETTINGS.inexact * model.ship.scale.speed
+    return MEASURED * model.ship.scale.speed
 
 
 def in_further_current(model: Model) -> list[Model]:

@@ -19,7 +19,7 @@ from scipy.linalg import pinv
 
 from ..predictors import Model, WeakWindows
 from ..predictors.prediction import FAR_OFF
-from ..predictors.uncertainty import correlated_windows
+from ..predictors.uncertainty import MEASURED, correlated_windows
 from ..predictors.weak_form import OVERLAP, commanded_force, inertial, needed_force
 from ..runs.run_constants import DIGITS
 from ..runs.smoothing.command_regression import least_squares
@@ -73,7 +73,7 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
         x = np.column_stack([T[:, j], *others, surroundings[j]])
         few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
-        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.inexact**2:
+        if few or not np.isfinite(x).all() or _own(T[:, j], others) < MEASURED**2:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = pinv(x / size)
@@ -84,7 +84,7 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
         # With less explained than all else leaves, it is not T that moves the ship; with less than a
         # model lacks that is not exact, T follows from the motion, as under feedback of the velocity.
-        least = max(unexplained, SETTINGS.inexact**2 * (a[:, j] @ a[:, j]))
+        least = max(unexplained, MEASURED**2 * (a[:, j] @ a[:, j]))
         told[j] = beta[0] ** 2 * own > least
     return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
 

@@ -22,7 +22,7 @@ from ..predictors.weak_form import thrust_along
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
-from ..runs.run_constants import STEPS
+from ..runs.run_constants import CHANCE, STEPS
 from ..runs.sensors.evidence import ALIKE, VELOCITIES
 from ..runs.sensors.sensor_finding import Examined
 from .command_check import beyond_thrusters, constant_commands, contradicted_commands
@@ -247,7 +247,7 @@ def likeliest_mistake(
         named, possible = sum(sound[:named]), [*compress(possible, sound)]
         if not possible:
             return None
-    asked = -np.log(SETTINGS.chance)
+    asked = -np.log(CHANCE)
     needed = asked if doubted else asked + np.log(len(possible))
     found = np.array([odds.log_density(reading) for reading in possible])
     as_read = odds.log_density(AS_READ)
@@ -265,7 +265,7 @@ def likeliest_mistake(
     if found.max() < lawful + asked or found.max() < without + np.log(2.0):
         return None
     better = found.max() - max(lawful, without)
-    near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
+    near = np.flatnonzero(found > found.max() + np.log(CHANCE))
     # Of a ship that is the same on both sides, axes that are mirrored are as well commands that are
     # swapped, which is a rarer mistake, unless it is twice as likely or more.
     order = sorted(

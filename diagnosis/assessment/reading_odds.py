@@ -25,6 +25,7 @@ from scipy.optimize import lsq_linear
 
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
+from ..predictors.uncertainty import MEASURED
 from ..predictors.weak_form import OVERLAP, needed_force, undamped
 from ..runs.run_constants import STEPS
 from .currents import in_further_current, in_likeliest_current
@@ -148,7 +149,7 @@ class ReadingOdds:
             why.may(-part, SETTINGS.much, 0.0, 1.0)
         for axis in axes:
             why.may((a - z) * axis, 1.0, -1.0)
-        least = SETTINGS.inexact * np.sqrt((a**2).mean(axis=0))
+        least = MEASURED * np.sqrt((a**2).mean(axis=0))
         found = why.explain(e, least, self.windows)
         return found._replace(density=found.density + self.windows * reading.density)
 
@@ -164,10 +165,10 @@ class ReadingOdds:
             for f in (np.cos, np.sin)
         )
         zero, one, why = np.zeros_like(north), np.ones_like(north), Explanation()
-        for j, size in enumerate(SETTINGS.inexact * self._full):
+        for j, size in enumerate(MEASURED * self._full):
             why.may(np.column_stack([one if k == j else zero for k in range(3)]), size)
         for column in ([north, -east, zero], [east, north, zero]):
-            why.may(np.column_stack(column), SETTINGS.inexact * float(self._full[0]))
+            why.may(np.column_stack(column), MEASURED * float(self._full[0]))
         return why
 
     @cached_property

@@ -25,6 +25,7 @@ from ..execution.short_text import ShortRepr
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import NOISE_TOLERANCE
 from ..runs.cleaning import Z95
+from ..runs.run_constants import CHANCE, PARTS
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 from .settings import SETTINGS
 
@@ -284,11 +285,11 @@ class _Design:
         if share > SETTINGS.largest_region or not clear:
             return None
         a, b = map(self._log_mean_square, parts)
-        if min(a.dof, b.dof) + 1 < SETTINGS.least_clusters:
+        if min(a.dof, b.dof) + 1 < PARTS:  # three degrees of freedom of each variance
             return None
         inner, outer = np.sqrt(np.divide(squares, windows)).tolist()
         p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
-        if p_value > SETTINGS.chance:
+        if p_value > CHANCE:
             return None
         cyclic = p.covariate.cyclic
         low = float(p.edges[first]) if first > 0 or cyclic else None

@@ -3,9 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ..predictors.uncertainty import MEASURED
 from ..runs import UNITS
-from ..runs.run_constants import CHANCE, NEGLIGIBLE, PARTS
 
 
 @dataclass(frozen=True)
@@ -15,8 +13,6 @@ class AssessmentSettings:
     Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
     """
 
-    chance: float = CHANCE  # 1, of an error of the first kind, all tests of a question together
-    negligible: float = NEGLIGIBLE  # 1, share of commands or windows that may be false or unexplained
     # 1, of accelerations over commands, of commands over full thrust. Derived: half of the way, in
     # logarithms, between one thruster of two and the foot, the smallest of the units: sqrt(2 * 3.28).
     most_gain: float = 2.5
@@ -24,9 +20,6 @@ class AssessmentSettings:
     # tenth, or none, is a matter of the diagnosis.
     least_gain: float = math.sqrt(UNITS["command"]["%"])
     windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
-    # 1, of the inertial force, that a model lacks at the least, and of the full thrust, deviation of a
-    # force that is steady
-    inexact: float = MEASURED
     # 1, share of a thrust: deviation of what of it is lost, and what of the full one nothing but an
     # actuator gives all the time; chosen
     much: float = 0.5
@@ -37,7 +30,6 @@ class AssessmentSettings:
     blocks_per_cluster: int = 2
     least_contrast: float = 1.4  # 1, of the RMS in a region to that elsewhere; chosen
     largest_region: float = 0.6  # 1, share of the windows; chosen
-    least_clusters: int = PARTS  # 1, inside and outside, for three degrees of freedom of each variance
     # 1, along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
     directions: int = 21
     least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen

@@ -23,8 +23,9 @@ from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
+from ..predictors.uncertainty import MEASURED
 from ..runs.cleaning import BRIEF
-from ..runs.run_constants import NEGLIGIBLE
+from ..runs.run_constants import CHANCE, NEGLIGIBLE
 from .closed_loop import REFERENCES, bound_of, largest_distance
 from .settings import SETTINGS
 
@@ -69,7 +70,7 @@ class OperatingRegion(NamedTuple):
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         u, v, r = nu[np.isfinite(nu).all(axis=1)].T
         sizes = (u[u > 0.0], np.abs(v), np.abs(r), -u[u < 0.0])
-        most = [np.quantile(size, 1.0 - SETTINGS.chance) if size.size else 0.0 for size in sizes]
+        most = [np.quantile(size, 1.0 - CHANCE) if size.size else 0.0 for size in sizes]
         return cls(*map(float, np.maximum(most, SETTINGS.least_region * np.array(cls.at(scale)))))
 
 
@@ -278,7 +279,7 @@ def driven_on(model: Model, other: Model, region: OperatingRegion) -> tuple[str,
 
 
 def _less(after: Any, before: Any) -> Any:
-    return after < before - SETTINGS.inexact**2 * np.abs(before)
+    return after < before - MEASURED**2 * np.abs(before)
 
 
 def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: OperatingRegion) -> str:

@@ -20,7 +20,7 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from ..predictors.thrust import FORGOTTEN
 from ..runs.cleaning import BRIEF
-from ..runs.run_constants import NEGLIGIBLE
+from ..runs.run_constants import CHANCE, NEGLIGIBLE
 from ..search.nonlinear.multistart import POINTS, REFINED
 from ..search.shortlist import LENGTH
 from .hypotheses import Space
@@ -28,7 +28,7 @@ from .information import CRITERIA, Knowledge, check_criterion, inseparable
 from .manoeuvre_library import (
     DIMENSIONS,
     LIBRARY,
-    USUAL,
+    USUAL_MANOEUVRES,
     PlanStep,
     Reach,
     UsualRuns,
@@ -37,7 +37,7 @@ from .manoeuvre_library import (
     usual,
 )
 from .order_library import ORDERS, USUAL_ORDERS, Orders
-from .planned_motion import Basin, PlannedMotion, as_windows, load, usable_thrust
+from .planned_motion import USABLE_THRUST, Basin, PlannedMotion, as_windows, load
 from .spread import MEMBERS, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
@@ -160,7 +160,7 @@ class Designer:
     def reach(self) -> Reach:
         """Speeds and room that manoeuvres may use."""
         nu = np.abs(self.measured[1])
-        speed, rate = np.quantile(np.hypot(nu[:, 0], nu[:, 1]), 0.99), np.quantile(nu[:, 2], 0.99)
+        speed, rate = (np.quantile(x, 1.0 - CHANCE) for x in (np.hypot(nu[:, 0], nu[:, 1]), nu[:, 2]))
         half = np.abs(self.outline[:, 0]).max()
         room = float(self.basin.size.min() - 2.0 * (half + self.margin))
         rate = max(FASTER * rate, FASTER * speed / max(0.5 * room, half))
@@ -181,7 +181,7 @@ class Designer:
     @property
     def usual_runs(self) -> UsualRuns:
         """Usual runs of such a ship."""
-        return USUAL if self.orders is None else USUAL_ORDERS
+        return USUAL_MANOEUVRES if self.orders is None else USUAL_ORDERS
 
     def motion(self, steps: Sequence[PlanStep], size: Size, h: float) -> PlannedMotion:
         """The motion of a plan every h [s], at shares of the largest speeds and of the room."""
@@ -236,7 +236,7 @@ class Designer:
         share = (
             0.0
             if motion.orders is not None
-            else load(motion.thrust(self.model), self.model) / usable_thrust()
+            else load(motion.thrust(self.model), self.model) / USABLE_THRUST
         )
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 

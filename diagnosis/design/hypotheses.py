@@ -15,7 +15,7 @@ from ..predictors.uncertainty import independent, omega_std
 from ..predictors.weak_form import OVERLAP
 from ..runs.run_constants import DIGITS, STEPS
 from ..search.candidates import SMALL, CandidateShape, candidate, model_error, shape
-from ..search.nonlinear.multistart import FAR
+from ..search.nonlinear.multistart import WIDEST
 from ..search.prior import NominalPrior
 from ..search.refinement import bounded
 from ..search.shortlist import LENGTH
@@ -195,7 +195,7 @@ def space_of(
     columns = space.rows(data)
     for name, place in space.places().items():
         norms = np.linalg.norm(columns[:, place[1:]], axis=0)
-        width = FAR * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
+        width = WIDEST * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
         smooth = blocks[name].precision
         own = np.diag(1.0 / width**2) + (0.0 if smooth is None else smooth)
         precision.append(np.asarray(block_diag(1.0 / DIGITS, own)))

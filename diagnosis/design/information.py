@@ -17,8 +17,7 @@ from scipy.special import logit, ndtr
 from cosim import InputError
 from cosim.errors import nearest
 
-from ..runs.run_constants import DIGITS
-from ..search.most_likely import LEVEL
+from ..runs.run_constants import DIGITS, LEVEL
 
 # nats, log odds of a cause that alone is the set with the probability LEVEL; the aim of a design
 ODDS = float(logit(LEVEL))

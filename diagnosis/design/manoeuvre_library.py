@@ -275,7 +275,7 @@ def sequence(point: np.ndarray, seconds: float, library: Iterable[str] = LIBRARY
 
 UsualRuns = Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]]
 # 1, usual runs of the same length, for comparison.
-USUAL: UsualRuns = {
+USUAL_MANOEUVRES: UsualRuns = {
     "ellipse": (("circle", (0.0, 0.0, 1.0, 0.4, 0.6)),),
     "circle": (("circle", (0.0, 0.0, 0.7, 1.0, 0.6)),),
     "zig-zag": (("zigzag", (0.6, 0.5, 1.0, 0.5, 0.3)),),
@@ -283,7 +283,7 @@ USUAL: UsualRuns = {
 }
 
 
-def usual(name: str, seconds: float, runs: UsualRuns = USUAL) -> list[PlanStep]:
+def usual(name: str, seconds: float, runs: UsualRuns = USUAL_MANOEUVRES) -> list[PlanStep]:
     """A usual run as a plan."""
     parts = runs[name]
     return [PlanStep(m, numbers, seconds / len(parts), 0.0) for m, numbers in parts]

@@ -20,7 +20,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
 from ..predictors.thrust import FORGOTTEN
 from .manoeuvre_library import SOFT, PlanStep, between, registered
-from .planned_motion import Basin, PlannedMotion, usable_thrust
+from .planned_motion import USABLE_THRUST, Basin, PlannedMotion
 from .spread import driven
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, time scale -> shares (n, 2) of thrust and rudder.
@@ -120,7 +120,7 @@ class Orders:
         used = [asked_of(w, ship) for w in data]
         most = faster * np.max([np.abs(x).max(axis=0) for x in used], axis=0)
         if ship.description.allocates:
-            full = usable_thrust() * np.array(ship.layout.full(params))
+            full = USABLE_THRUST * np.array(ship.layout.full(params))
             thrust = np.array([min(most[0], full[0]), 0.0, 0.0])
             found = cls(TAU, -thrust, thrust, np.array([0.0, 0.0, min(most[2], 0.5 * full[2])]))
         else:

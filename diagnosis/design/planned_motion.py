@@ -11,10 +11,8 @@ from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.uncertainty import MEASURED
 from ..runs import Run, Smoothed, body_acceleration, body_velocity
 
-
-def usable_thrust() -> float:
-    """Share of the limit of an actuator [1]: two standard deviations of a model remain for control."""
-    return 1.0 - 2.0 * MEASURED
+# 1, of the limit of an actuator: two standard deviations of a model remain for control
+USABLE_THRUST = 1.0 - 2.0 * MEASURED
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,13 @@ from ..predictors import WeakWindows
 from ..predictors.uncertainty import omega_std
 from ..predictors.weak_form import OVERLAP
 from ..runs.cleaning import Z95
+from ..runs.run_constants import LEVEL
 from ..search.candidates import Candidate, CandidateShape, candidates, model_error
 from ..search.effect_evidence import EffectEvidence, evidence, nearest_share
 from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
-from ..search.most_likely import LEVEL, ridge
+from ..search.most_likely import ridge
 from ..search.shortlist import LENGTH
 from ..verdict.confidence import Doubts, confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
@@ -35,9 +36,8 @@ LEFT = "{} leaves a significant residual in {} in the runs so far, which limits 
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
 
 
-def overlapping() -> np.ndarray:
-    """(3,), noise of overlapping windows where that of one that counts is 1."""
-    return np.full(3, OVERLAP**-0.5)
+# 1, noise on each axis of overlapping windows where that of one that counts is 1
+NOISE = np.full(3, OVERLAP**-0.5)
 
 
 class RowsOfRuns(NamedTuple):
@@ -184,14 +184,14 @@ class RehearsedEffect:
         known = sum((rows.X[..., places[i][0]] for i in others), np.zeros_like(like))
         effects = s.start.ship.effects
         every = [Candidate(effects[i], [shapes[i]]) for i in (effect, *(shapes.keys() - h.ids))]
-        table = gram_table(like - known, rows.blocks, every, nuisance, overlapping())
+        table = gram_table(like - known, rows.blocks, every, nuisance, NOISE)
         order = sorted(range(1, len(every)), key=lambda c: (_charged(table, c), every[c].effect.id))
         chosen = [every[c] for c in (0, *order[: LENGTH - 1])]
         return cls(chosen, nuisance, known, rows, s.blocks[effect].steps)
 
     def finding(self, y: np.ndarray, rng: np.random.Generator) -> Finding:
         """The effect as it is found for a model error (K, 3), with its evidence."""
-        table = gram_table(y - self.known, self.rows.blocks, self.rivals, self.nuisance, overlapping())
+        table = gram_table(y - self.known, self.rows.blocks, self.rivals, self.nuisance, NOISE)
         each = [score(table, c, 1) for c in (*range(len(self.rivals)), -1)]  # -1: none of them
         share = float(first_share(each, rng)[0])
         seen, values, std = self.judged(y)
@@ -204,7 +204,7 @@ class RehearsedEffect:
     def judged(self, y: np.ndarray) -> tuple[EffectEvidence, dict[str, float], dict[str, float]]:
         """Evidence of the effect without rivals, its values, and their standard deviations, SI."""
         y, s, nuisance = y - self.known, self.rivals[0].shapes[0], self.nuisance
-        table = gram_table(y, self.rows.blocks, self.rivals[:1], nuisance, overlapping())
+        table = gram_table(y, self.rows.blocks, self.rivals[:1], nuisance, NOISE)
         given = [] if s.offset is None else [s.offset[..., None]]
         A = np.concatenate([y[..., None], *given, s.columns, nuisance.columns], axis=2)
         r = regression(table, 0, 0)

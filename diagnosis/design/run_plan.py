@@ -11,7 +11,7 @@ from ..execution.result_folder import together
 from ..execution.short_text import ShortRepr
 from ..report.formatting import write_json
 from ..runs.cleaning import Z95
-from ..search.most_likely import LEVEL
+from ..runs.run_constants import LEVEL
 from .designing import Designer, ScoredPlan
 from .information import CRITERIA, Knowledge, pairs, projected
 from .manoeuvre_library import TEXTS

@@ -11,7 +11,7 @@ from ..assessment.gathering import gather
 from ..execution.progress import Advance, silent
 from ..report.content import file_content
 from ..report.report_data import ReportData
-from ..search.most_likely import LEVEL
+from ..runs.run_constants import LEVEL
 from ..session import begin
 from .next_plan import Question, plan_next
 from .run_files import scenario_file

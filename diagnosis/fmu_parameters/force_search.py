@@ -7,8 +7,7 @@ import numpy as np
 
 from ..execution.progress import Advance
 from ..predictors.weak_form import SMALL
-from ..runs.run_constants import SAME
-from ..search.most_likely import LEVEL
+from ..runs.run_constants import DIGITS, LEVEL, SAME
 from ..search.shortlist import LENGTH
 from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
@@ -196,14 +195,14 @@ def _scaled(
     def first(f: AdditionalForce) -> float:
         y = sizes.get(f.output, 1.0) if f.output else 1.0
         if f.rate:
-            y /= max(float(np.median([w.time[-1] for w in r.windows])) / 10.0, 1e-9)
-        return SMALL * usual[f.input] / max(y, 1e-12) ** f.power
+            y /= max(float(np.median([w.time[-1] for w in r.windows])) / 10.0, DIGITS)
+        return SMALL * usual[f.input] / max(y, DIGITS) ** f.power
 
     guess = [(f, first(f)) for f in forces]
     found = []
     for (f, c), change in zip(guess, by(guess), strict=True):
         norm = float(np.linalg.norm(change))
-        if np.isfinite(norm) and norm > 1e-6:
+        if np.isfinite(norm) and norm > DIGITS:
             found.append((f, c * 0.1 * wanted / norm))
     changes = zip(found, by(found), strict=True)
     return [
@@ -219,4 +218,4 @@ def _size(r: WindowResiduals, k: int) -> float:
         y = np.concatenate([w.measured[:, k] for w in r.windows])
     else:
         y = np.concatenate([p.outputs[:, k] for p in r.predict([r.start])[0]])
-    return max(float(np.sqrt(np.nanmean(y**2))), 1e-12) if np.isfinite(y).any() else 1.0
+    return max(float(np.sqrt(np.nanmean(y**2))), DIGITS) if np.isfinite(y).any() else 1.0

@@ -22,7 +22,7 @@ from ..report.formatting import write_json
 from ..runs import QUANTITY
 from .system_map import SystemMap, column_of_start
 
-STEP = 1e-3  # s, of the short steps where the FMU suggests none; chosen
+SHORT_STEP = 1e-3  # s, of the short steps where the FMU suggests none; chosen
 
 
 class LinearState(NamedTuple):
@@ -171,7 +171,7 @@ def linearised(
     start = {s.name: float(model.variables[s.name].start or 0.0) for s in states}
     start |= {n: x for n, x in at.items() if n not in inputs}
     driven = {n: at.get(n, float(model.variables[n].start or 0.0)) for n in inputs}
-    h = model.suggested_step or STEP
+    h = model.suggested_step or SHORT_STEP
     with closing(confined(model, execution)) as fmu:
         n, doubt, every = len(states), 0.0, (*(s.name for s in states), *driven)
         J = _exact(fmu, states, start, driven, outputs, h)

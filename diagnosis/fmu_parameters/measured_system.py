@@ -20,7 +20,7 @@ from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
 MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
-DIGITS = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
+LEAST_SHARE = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
 # 1, by which the standard deviation of a start value is larger than that of its parabola, which also
 # bends otherwise than the signal, by as much as the noise hides; chosen.
 UNSURE = 3.0
@@ -149,7 +149,7 @@ def noises(runs: Sequence[MeasuredRun], given: SystemMap) -> np.ndarray:
             raise InputError(f"column {quoted(column)} has no samples in '{runs[0].name}'")
         noise = c.noise or max(
             float(np.median([noise_of(r.columns[column]) for r in runs])),
-            DIGITS * float(np.nanstd(every)),
+            LEAST_SHARE * float(np.nanstd(every)),
             float(np.finfo(float).tiny ** 0.5),
         )
         found.append(abs(c.factor) * noise)

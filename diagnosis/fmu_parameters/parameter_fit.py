@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..runs.cleaning import Z95
-from ..search.most_likely import ENOUGH, STEPS
+from ..runs.run_constants import STEPS
+from ..search.most_likely import ENOUGH
 from .additional_force import AdditionalForce
 from .residuals import Setting, WindowResiduals
 

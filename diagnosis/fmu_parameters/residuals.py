@@ -24,7 +24,7 @@ from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # 1, of a difference at most, in standard deviations of a prior or a start value; chosen
+DIFFERENCE = 0.02  # 1, at most, in standard deviations of a prior or a start value; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
 LINEAR = 0.3  # 1, rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
@@ -231,8 +231,8 @@ class WindowResiduals:
             return np.concatenate([np.nan_to_num(self._off(w, there), nan=LARGEST), z])
 
         def slopes(z: np.ndarray) -> np.ndarray:
-            base, *moved = (self._off(w, p) for p in at([z, *(z + STEP * np.eye(z.size))]))
-            S = np.column_stack([(r - base) / STEP for r in moved])
+            base, *moved = (self._off(w, p) for p in at([z, *(z + DIFFERENCE * np.eye(z.size))]))
+            S = np.column_stack([(r - base) / DIFFERENCE for r in moved])
             return np.where(np.isfinite(S).all(axis=0), S, 0.0)
 
         (here,) = at([z])
@@ -266,10 +266,10 @@ class WindowResiduals:
         found = self._differences(setting, sizes)
         change = np.sqrt(np.mean(found[0] ** 2, axis=0))
         names = [*(p.name for p in self.parameters), *(f.id for f in setting.forces)]
-        last = [self._steps.get(n, STEP) for n in names]
+        last = [self._steps.get(n, DIFFERENCE) for n in names]
         # A step that changes the residuals by more than the noise shows the curvature of a prediction in
         # its slope; a shorter one shows the rounding of solvers.
-        steps = np.minimum(STEP, 1.0 / np.maximum(change, 1.0 / STEP))
+        steps = np.minimum(DIFFERENCE, 1.0 / np.maximum(change, 1.0 / DIFFERENCE))
         self._steps |= zip(names, steps.tolist(), strict=True)
         again = np.any(np.array(last) > 2.0 * steps)
         return self._differences(setting, sizes) if again else found
@@ -301,12 +301,12 @@ class WindowResiduals:
         for k, p in enumerate(self.parameters):
             low, high = p.bounds
             z = setting.z[k]
-            step = self._steps.get(p.name, STEP)
+            step = self._steps.get(p.name, DIFFERENCE)
             down, up = min(step, max(z - low, 0.0)), min(step, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
         present = np.array([f.coefficient for f in setting.forces])
         for f, size, axis in zip(setting.forces, sizes, np.eye(present.size), strict=True):
-            step = self._steps.get(f.id, STEP)
+            step = self._steps.get(f.id, DIFFERENCE)
             ends = (present - step * size * axis, present + step * size * axis)
             low, high = (setting.with_coefficients(c.tolist()) for c in ends)
             yield f.id, low, high, step, step

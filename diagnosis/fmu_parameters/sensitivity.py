@@ -8,7 +8,7 @@ import numpy as np
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
 from ..predictors.weak_form import SMALL
-from ..search.most_likely import STEPS
+from ..runs.run_constants import STEPS
 from ..search.prediction_fit.joint_posterior import TOGETHER, connected
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals

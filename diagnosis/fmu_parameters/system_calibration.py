@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.special import chdtri
 
 from ..execution.progress import Advance, silent
-from ..predictors.evaluation import quantile
 from ..predictors.prediction import FAR_OFF
 from ..runs.cleaning import normal_within
 from ..runs.run_constants import CHANCE
@@ -188,7 +188,7 @@ def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
         held = held.with_coefficients([0.0] * len(held.forces))
     other = fit(r, held, best.sizes, range(p))
     ratio = (other.data_cost - best.data_cost) / grown
-    some = ratio > quantile(1.0 - CHANCE, p)
+    some = bool(ratio > chdtri(p, CHANCE))
     # Beyond the interval that holds all of them with 99 %.
     wide = normal_within(1.0 - CHANCE / max(p, 1))
     std = np.sqrt(grown * np.diag(best.covariance)[:p])

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.special import gammaincinv
+from scipy.special import chdtri
 
 from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
@@ -17,11 +17,6 @@ from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows
 
 LEVELS = (0.5, 0.9)  # 1, probabilities of the bands that are shown; 90 % of the contract, and half
-
-
-def quantile(level: float, dof: int) -> float:
-    """Quantile of the chi-squared distribution; `scipy.stats` takes a while to import."""
-    return 2.0 * float(gammaincinv(0.5 * dof, level))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,8 +56,8 @@ class Bands(ShortRepr):
         xx, xy, yy = V[:, 0, 0], V[:, 0, 1], V[:, 1, 1]
         with np.errstate(over="ignore", invalid="ignore"):
             squares, det = yy * x**2 - 2.0 * xy * x * y + xx * y**2, xx * yy - xy**2
-            position = squares <= quantile(level, 2) * det
-        heading = residuals[:, 2] ** 2 <= quantile(level, 1) * V[:, 2, 2]
+            position = squares <= chdtri(2, 1.0 - level) * det
+        heading = residuals[:, 2] ** 2 <= chdtri(1, 1.0 - level) * V[:, 2, 2]
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
@@ -71,7 +66,7 @@ class Bands(ShortRepr):
         NaN where the prediction diverges.
         """
         around = np.linspace(0.0, 2.0 * np.pi)
-        circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
+        circle = np.sqrt(chdtri(2, 1.0 - level)) * np.column_stack([np.cos(around), np.sin(around)])
         V = self.covariance[window, :, :2, :2]
         known = np.isfinite(V).all(axis=(1, 2))
         squares, axes = np.linalg.eigh(np.where(known[:, None, None], V, 0.0))
@@ -84,7 +79,7 @@ class Bands(ShortRepr):
 
         Half a turn to both sides is any heading.
         """
-        reach = np.minimum(np.sqrt(quantile(level, 1) * self.covariance[window, :, 2, 2]), np.pi)
+        reach = np.minimum(np.sqrt(chdtri(1, 1.0 - level) * self.covariance[window, :, 2, 2]), np.pi)
         return np.stack([-reach, reach]) + self.predicted[window, :, 2]
 
     def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:

@@ -50,7 +50,8 @@ SHARE_OF_COMMAND = 0.02
 
 # 1, relative standard deviation of a measured coefficient. The search has no more for any coefficient;
 # one prior for all has no more for masses, thrusters' forces and places, which no other ship had to
-# lend. So much of the inertial force a model lacks at the least.
+# lend. So much of the inertial force a model lacks at the least, and a steady force deviates by as much
+# of the full thrust.
 MEASURED = 0.1
 
 

@@ -25,7 +25,6 @@ from .uncertainty import NOISE_TOLERANCE
 from .weak_form import BLOCK, BLOCKS, HORIZON
 
 # Of a run that is predicted as a whole, times the scale of the ship.
-FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 ANY_TIME = (-np.inf, np.inf)  # s
 # m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
@@ -305,7 +304,7 @@ def free_runs(
         the model runs away.
     """
     first = first_row(smoothed, begin)
-    h = max(step_of(smoothed), FREE_STEP * smoothed.scale.time)
+    h = max(step_of(smoothed), BRIEF * smoothed.scale.time)  # the mean of the commands acts
     left = float(smoothed.time[-1] - smoothed.time[first])
     seconds = min(left, LONGEST_FREE * smoothed.scale.time)
     starts = WindowStarts(((smoothed, np.array([first])),), h, int(seconds / h))

@@ -68,7 +68,7 @@ MAY_BE_CHANCE = "; of so few windows this may be chance"
 LESS_BEYOND = "what was learned does not hold in it"
 BESIDE = " In addition it fits, without claiming a cause: {}"
 PRODUCTS = "small coefficients of further products of speeds"
-FAR = (
+FAR_COEFFICIENTS = (
     "Other values of the nominal coefficients explain these data, but beyond {far:g} standard "
     "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
     "change of them."
@@ -282,7 +282,7 @@ def headline(r: ReportData) -> str:
         beside = fitted_beside(d) if d.calibrated else []
         further = BESIDE.format(" ".join(beside)) if beside else ""
         if far and d.refitted and not d.remainder.significant:
-            return FAR.format(far=FAR_OFF, names=listed(far, "and")) + further
+            return FAR_COEFFICIENTS.format(far=FAR_OFF, names=listed(far, "and")) + further
         beyond = BEYOND.format(far=FAR_OFF, names=listed(far, "and")) if far else ""
         known = (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
         return known + further + beyond

@@ -9,12 +9,13 @@ import numpy as np
 from ..predictors import Model
 from ..predictors.uncertainty import omega_std
 from ..predictors.weak_form import OVERLAP
+from ..runs.cleaning import Z95
 from .candidates import model_error
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import WHOLE_RUNS, Nuisance, block_folds, gram_table
 from .map_regression import regression
-from .most_likely import beyond, ridge, rise
+from .most_likely import beyond, ridge
 from .prior import NominalPrior
 from .refinement import RefinedModel, TrainingSet, bounded, nuisance_of, refit, weighted_rows
 from .rivals import LinearProblem, may_be_modulated, modulated_forces, probability_beside
@@ -245,8 +246,7 @@ def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:
 
 def interval(value: float, std: float) -> tuple[float, float]:
     """95 % interval."""
-    half = std * float(np.sqrt(rise()))
-    return value - half, value + half
+    return value - Z95 * std, value + Z95 * std
 
 
 def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray, start: Model) -> list[Suspect]:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictors.uncertainty import NOISE_TOLERANCE
-from .most_likely import LEVEL
+from ..runs.run_constants import LEVEL
 
 
 class EffectEvidence(NamedTuple):

@@ -13,9 +13,8 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ..predictors.evaluation import quantile
 from ..runs.cleaning import normal_within
-from ..runs.run_constants import CHANCE, DIGITS, LEVEL, STEPS
+from ..runs.run_constants import CHANCE, DIGITS, STEPS
 
 # 1, of cost: where a step promises less, parameters are within a seventh of their deviation
 ENOUGH = 0.02
@@ -39,11 +38,6 @@ class Quadratic(Generic[At]):
 
 
 About = TypeVar("About", bound=Quadratic[Any])
-
-
-def rise() -> float:
-    """How far the cost of one value rises from its least to the ends of its interval (chi-square)."""
-    return quantile(LEVEL, 1)
 
 
 def beyond(places: int) -> float:

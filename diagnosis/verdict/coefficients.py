@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri
 
 from ..assessment.residual.remainder import remains
 from ..predictors import Model
-from ..predictors.evaluation import quantile
 from ..runs.run_constants import CHANCE
 from ..search.findings import Finding, Findings
 from ..search.gram import WHOLE_RUNS
@@ -218,4 +218,4 @@ def _differs(fit: RefitOutcome, parameters: Collection[str]) -> bool:
     if not at:
         return False
     V, C = known.mean[at], known.covariance[np.ix_(at, at)]
-    return float(V @ np.linalg.solve(C, V)) > quantile(1.0 - CHANCE, len(at))
+    return bool(V @ np.linalg.solve(C, V) > chdtri(len(at), CHANCE))

@@ -32,11 +32,11 @@ class Harm(Protocol):
 
 # Name -> module of the package and its function.
 CRITERIA = {"paired": ("search.significance", "harm"), "bic": ("verdict.information_criterion", "harm")}
-USUAL = "paired"
+PAIRED = "paired"
 PACKAGE = __name__.partition(".")[0]
 
 
-def criterion(name: str = USUAL) -> Harm:
+def criterion(name: str = PAIRED) -> Harm:
     """A criterion of pruning by its name.
 
     Args:

@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 from ...predictors import WeakWindows
 from ...predictors.uncertainty import correlated_windows
 from ...predictors.weak_form import BLOCK, common_commands
+from ...runs.run_constants import CHANCE, NEGLIGIBLE
 from ..regions import numbered
 from ..settings import SETTINGS
 from .structural_change import STRETCH, moment_of_change
@@ -77,7 +78,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     at_a_place = np.hstack([_scaled(place), spaces["motion"]])
     together = _neighbours(at_a_place, run, time, apart, count)
     rng = np.random.default_rng(0)
-    shifts = round(1.0 / SETTINGS.chance) - 1
+    shifts = round(1.0 / CHANCE) - 1
     offsets = rng.integers(least, max(len(left) - least, least + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)
     lasts[lasts > max(np.ptp(w.middle) for w in data)] = np.inf
@@ -97,7 +98,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
         in_part = _in_part(error, command[:, k], others, stretch, shares["command"])
         size = np.bincount(run, error**2) / np.bincount(run)
         one = int(size.argmax())
-        alone = len(data) > 1 and size[one] > (1.0 - SETTINGS.negligible) * size.sum()
+        alone = len(data) > 1 and size[one] > (1.0 - NEGLIGIBLE) * size.sum()
         regressors = _scaled(np.column_stack([*others, command[:, k]]))
         changes = moment_of_change(data, error, regressors, max(shares.values()))
         one_run = data[one].run.name if alone else ""
@@ -189,4 +190,4 @@ def _in_part(
         squares = np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0])
         return float(squares / max(error @ error, np.finfo(float).tiny))
 
-    return explained(command) > max(*map(explained, others), always) + SETTINGS.negligible
+    return explained(command) > max(*map(explained, others), always) + NEGLIGIBLE

@@ -26,11 +26,13 @@ from fmus.scale import REFERENCE, Scale
 from ...predictors import Model, WeakWindows, omega
 from ...predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
+from ...runs.run_constants import CHANCE, NEGLIGIBLE
 from ..covariates import AXES
 from ..regions import NAMES, UNITS, Region, numbered
-from ..settings import SETTINGS
 from .recurrence import TOGETHER, Recurrence
 
+CHANCE_OF_ONE = CHANCE / (2 * len(AXES))  # 1, of each of two tests on each axis, by Bonferroni
+SPAN = round(2 * WIDTH / EVERY)  # 1, windows
 NOTHING_LEFT = "The residual of the model is within the uncertainty of the measurement."
 LITTLE_LEFT = (
     "The residual of the model exceeds the noise of the measurement, but is less than 5 % of the "
@@ -122,7 +124,7 @@ class AxisRemainder:
     @property
     def beyond_chance(self) -> bool:
         """Whether more is left than noise gives, be it so little that it does not matter."""
-        return self.p_value < level()
+        return self.p_value < CHANCE_OF_ONE
 
     @property
     def is_slow(self) -> bool:
@@ -167,9 +169,9 @@ def axis_remainders(
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups, freedom[k])
         rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
         force = _rms(command[:, k])
-        least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * force)
+        least = max(NEGLIGIBLE * start, SHARE_OF_COMMAND * force)
         beyond = rms**2 - uncertainty**2 > least**2  # without the noise, as the slow part is
-        matters = (by_size < level() and beyond) or (by_slowness < level() and slow > least)
+        matters = (by_size < CHANCE_OF_ONE and beyond) or (by_slowness < CHANCE_OF_ONE and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         of_command = rms / force if force > 0.0 else np.nan
         p_value = min(by_size, by_slowness)
@@ -210,17 +212,7 @@ def chance(dof: float, ratio: float, freedom: float) -> float:
 def spans(data: Sequence[WeakWindows]) -> np.ndarray:
     """(K,), number of the span that each window of some runs lies in, over all runs."""
     since = [np.rint((w.middle - w.middle[0]) / w.every) for w in data]
-    return numbered([s // span_windows() for s in since])
-
-
-def level() -> float:
-    """Of each of two tests on each axis, by Bonferroni's correction."""
-    return SETTINGS.chance / (2 * len(AXES))
-
-
-def span_windows() -> int:
-    """How many windows a span has."""
-    return round(2 * WIDTH / EVERY)
+    return numbered([s // SPAN for s in since])
 
 
 def _slow_part(
@@ -228,7 +220,7 @@ def _slow_part(
 ) -> tuple[float, float]:
     """RMS of the means over spans, less that of noise, and the p-value that they are noise."""
     count = np.bincount(groups)
-    full = 2 * count >= span_windows()
+    full = 2 * count >= SPAN
     if not full.any():
         return 0.0, 1.0
     mean = (np.bincount(groups, left) / count)[full]

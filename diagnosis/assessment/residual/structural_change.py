@@ -17,9 +17,10 @@ from scipy.special import fdtrc
 
 from ...predictors import WeakWindows
 from ...predictors.weak_form import BLOCK, EVERY
+from ...runs.run_constants import CHANCE, NEGLIGIBLE
 from ..settings import SETTINGS
 
-ORDER = 3  # 1, of the polynomial of a drift: the least with a change to and fro
+DEGREE = 3  # 1, of the polynomial of a drift: the least with a change to and fro
 STRETCH = round(BLOCK / (2 * EVERY))  # windows between moments that are tried, of one amplitude
 
 
@@ -55,19 +56,19 @@ def moment_of_change(
     found, (own, x) = changes[k], parts[k]
     if not 3 * STRETCH <= found.row <= len(x) - 3 * STRETCH:
         return None  # at an edge of what is tried: what lies beyond may be the start of a run
-    drift = np.hstack([x * (np.linspace(-1.0, 1.0, len(x)) ** k)[:, None] for k in range(ORDER + 1)])
+    drift = np.hstack([x * (np.linspace(-1.0, 1.0, len(x)) ** k)[:, None] for k in range(DEGREE + 1)])
     halves = _halves(own, x, found.row)
     rest = sum(float(np.sum(_rest(*half) ** 2)) for half in halves)
     changes_once = (
         found.gain >= SETTINGS.repeats * (error @ error)
-        and own @ own - rest > (always + SETTINGS.negligible) * (error @ error)
+        and own @ own - rest > (always + NEGLIGIBLE) * (error @ error)
         and rest < float(np.sum(_rest(own, drift) ** 2))
         and found.gain > max(most_changed(*half).gain for half in halves)
     )
     if not changes_once:
         return None
     clear = _chance(own, x)
-    if clear >= SETTINGS.chance or any(_chance(e, x) <= clear for e in _surrogates(_rest(own, x))):
+    if clear >= CHANCE or any(_chance(e, x) <= clear for e in _surrogates(_rest(own, x))):
         return None
     return data[k].run.name, float(data[k].middle[found.row])
 
@@ -99,7 +100,7 @@ def _correlated(series: np.ndarray) -> float:
 def _surrogates(series: np.ndarray) -> Iterator[np.ndarray]:
     """Series with the spectrum of one, as many as a test at the level of chance needs."""
     rng, size = np.random.default_rng(0), np.abs(np.fft.rfft(series))
-    for _ in range(round(1.0 / SETTINGS.chance) - 1):
+    for _ in range(round(1.0 / CHANCE) - 1):
         yield np.fft.irfft(size * np.exp(2j * np.pi * rng.random(size.size)), series.size)
 
 

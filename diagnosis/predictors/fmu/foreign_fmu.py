@@ -22,6 +22,7 @@ from fmus.ship import Ship, ship
 from ...execution.progress import Advance, silent
 from ...execution.result_folder import sha256
 from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed, body_acceleration, body_velocity
+from ...runs.cleaning import BRIEF
 from ...runs.run_constants import WIDTH
 from ..black_box import (
     MOTION,
@@ -47,7 +48,7 @@ from ..predictor import (
 from ..ship_model import Model
 from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
-from ..windows import FREE_STEP, Windows, step_of
+from ..windows import Windows, step_of
 from .fmu_playback import PlaybackRequest, Processes, ShortSteps, confined
 from .lineage import SYSTEMS, learned_from, parts_of, remember
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
@@ -245,7 +246,7 @@ class FmuPredictor(BlackBox):
     @cached_property
     def _along_runs(self) -> Model:
         inputs, outputs, time = self.processes.inputs, self.processes.outputs, self.runs[0].scale.time
-        h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
+        h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, BRIEF * time)
         late = bool(self.late)
         with closing(ShortSteps(self.confined, inputs, outputs, h, late)) as self._steps:
             return super()._along_runs

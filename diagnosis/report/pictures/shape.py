@@ -12,10 +12,10 @@ from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
 from fmus.hull import damping_force
 
-from ...assessment.settings import SETTINGS
 from ...predictors import Model
 from ...predictors.evaluation import Evaluation
 from ...predictors.thrust import commanded_shares
+from ...runs.run_constants import CHANCE
 from ..reported_effect import ReportedCoefficient, ReportedEffect
 from .chart import WIDTH
 
@@ -166,6 +166,6 @@ def _curve(
     sure = None
     if effect.linear:  # in weights that are never negative
         sure = by(lambda c: (c.ci95 or (c.value,))[0]), by(lambda c: (c.ci95 or (c.value,))[-1])
-    low, high = np.quantile(data, [SETTINGS.chance, 1.0 - SETTINGS.chance])
+    low, high = np.quantile(data, [CHANCE, 1.0 - CHANCE])
     nominal, learned = by(lambda _: 0.0), by(lambda c: c.value)
     return Curve(effect.id, s.over, s.what, x, nominal, learned, sure, (float(low), float(high)))

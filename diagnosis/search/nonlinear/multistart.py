@@ -27,7 +27,7 @@ REFINED = 3  # 1, best starts or plans that are examined further; chosen
 # large as the model error. A parameter without limits is tried as far to both sides of its scale;
 # chosen.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
-FAR = MULTIPLES[-1]
+WIDEST = MULTIPLES[-1]
 
 Force = Callable[[Mapping[str, float]], np.ndarray]
 Values = dict[str, float]
@@ -61,17 +61,17 @@ class Landscape:
     def scale(self, p: Variable) -> float:
         """Of a parameter: its start, its limits, or how far the ship moved and turned."""
         ends = [abs(x) for x in (p.range.min, p.range.max) if x is not None]
-        by_unit = {"m": self.extent / 5.0, "rad": pi / FAR}.get(p.unit, 0.0)
+        by_unit = {"m": self.extent / 5.0, "rad": pi / WIDEST}.get(p.unit, 0.0)
         return max(abs(self.values[p.name]), by_unit) or max(ends, default=0.0) or self.units[p.name]
 
     def within(self, p: Variable, share: float) -> float:
         """The value at a share, 0 to 1, of the way through what is tried of a parameter."""
         low, high = p.range.min, p.range.max
         if low is not None and high is not None:
-            if low > 0.0 and high > FAR**2 * low:  # further than both sides of a scale
+            if low > 0.0 and high > WIDEST**2 * low:  # further than both sides of a scale
                 return low * (high / low) ** share
             return low + share * (high - low)
-        value = self.values[p.name] + self.scale(p) * np.sinh((2.0 * share - 1.0) * asinh(FAR))
+        value = self.values[p.name] + self.scale(p) * np.sinh((2.0 * share - 1.0) * asinh(WIDEST))
         return float(np.clip(value, *limits(p)))
 
     def points(self, names: Sequence[str]) -> Iterator[Values]:

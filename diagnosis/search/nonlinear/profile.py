@@ -16,9 +16,9 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from ...predictors.ship_model import parameter_and_run
+from ...runs.cleaning import Z95
 from ..candidates import SMALL, model_error
 from ..conclusion import AcceptedEffect
-from ..most_likely import rise
 from ..refinement import (
     CandidateStart,
     Refined,
@@ -101,10 +101,10 @@ def _profile(
 
 
 def _end(trial: Callable[[float], Refined], least: float, value: float, end: float) -> float:
-    """Where the cost rises by :func:`rise` between a value and an end; the end if nowhere."""
+    """Where the cost rises by Z95**2 between a value and an end; the end if nowhere."""
 
     def beyond(x: float) -> float:
-        return trial(x).cost - least - rise()
+        return trial(x).cost - least - Z95**2
 
     if beyond(end) <= 0.0:
         return end

@@ -33,8 +33,9 @@ from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
 from ...predictors.uncertainty import FLOOR
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
-from ...runs.cleaning import BRIEF
-from ..most_likely import ENOUGH, STEPS, ridge, rise
+from ...runs.cleaning import BRIEF, Z95
+from ...runs.run_constants import STEPS
+from ..most_likely import ENOUGH, ridge
 from .interval_sums import IntervalSums
 
 Interval = tuple[float, float]
@@ -315,7 +316,7 @@ def moved(p: SegmentationProblem, spans: Spans) -> Spans:
 
 def likely(p: SegmentationProblem, spans: Spans) -> dict[str, Interval]:
     """95 % intervals of all change points [s] by their names, each with the others held."""
-    least, found = p.cost(spans) + rise(), {}
+    least, found = p.cost(spans) + Z95**2, {}
     for k, (span, pair) in enumerate(zip(spans, p.keys(spans), strict=True)):
         section = p.section(span[0])
         for end, key in enumerate(pair):
