@@ -231,7 +231,7 @@ def chosen(d: Designer, k: Knowledge, kind: str, seed: int) -> Iterator[tuple[st
         rng = np.random.default_rng(seed)
         points = rng.random((PATIENCE, 4 * DIMENSIONS))
         plans = (sequence(point, d.limits.seconds, d.library) for point in points)
-        found = next((s for p in plans if (s := d.scored(k, p)).excess == 0.0), None)
+        found = next((s for p in plans if (s := d.scored(k, [p])[0]).excess == 0.0), None)
         if found is None:
             raise InputError("no random run keeps the limits")
         yield kind, found

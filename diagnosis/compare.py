@@ -31,7 +31,6 @@ from .execution.progress import Advance
 from .execution.result_folder import together
 
 COMPARISON, REPORT = FILES = ("comparison.json", "report.html")
-NOT_MET = 1  # exit code
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -94,7 +93,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
             command = origin["command"]
             record = validate(comparison, criteria, options.learned, files, command)
             names = record.write_into(new, options.sign)
-            code = NOT_MET if options.require_met and not record.met else 0
+            code = int(options.require_met and not record.met)
             judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
             judged.append(f"  {', '.join(names)} in {options.out}")
     yield Done(code, [f"{REPORT} in {options.out}", *map(printable, judged)])

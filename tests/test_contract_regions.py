@@ -20,6 +20,7 @@ from diagnosis.assessment.regions import (
     welch_p_value,
 )
 from diagnosis.assessment.settings import SETTINGS
+from diagnosis.runs.run_constants import BLOCK
 from fmus.scale import REFERENCE
 
 CLUSTERS, EACH = 40, 4  # clusters of windows, and windows of each
@@ -41,7 +42,7 @@ VALUES = (
 def design(squares, covariate=SPEED, values=VALUES, several=False, run=None, noise=NOISE):
     rows = np.arange(values.size)
     by = SimpleNamespace(covariate=covariate, rows=rows, values=values, run=run)
-    by.edges = covariate.bin_edges(values)
+    by.edges = covariate.bin_edges(values, BLOCK)
     return _Design.of("X", by, squares, noise, CLUSTER, several)
 
 
@@ -116,7 +117,7 @@ def test_a_bin_without_windows_has_no_rms():
 def test_rows_of_some_windows_alone_are_counted():
     rows = np.arange(0, VALUES.size, 2)
     by = SimpleNamespace(covariate=SPEED, rows=rows, values=VALUES[rows], run="b")
-    by.edges = SPEED.bin_edges(by.values)
+    by.edges = SPEED.bin_edges(by.values, BLOCK)
     squares, _ = where(0.5, 0.75)
     d = _Design.of("X", by, squares, NOISE, CLUSTER, True)
     assert d.count.sum() == rows.size

@@ -113,7 +113,7 @@ def test_a_plan_has_the_first_size_at_which_it_keeps_the_limits(monkeypatch):
     monkeypatch.setitem(designing.CRITERIA, "certainty", lambda k, gram: 0.5)
     d = Sized({"a": 0, "b": 2, "c": 99})
     plans = [[PlanStep(n, (), 1.0, 0.0)] for n in "abc"]
-    a, b, c = d.scored_all(SimpleNamespace(G=np.ones((1, 1))), plans)
+    a, b, c = d.scored(SimpleNamespace(G=np.ones((1, 1))), plans)
     assert (a.size, b.size, c.size) == (
         designing.SMALLER[0],
         designing.SMALLER[2],
@@ -123,7 +123,7 @@ def test_a_plan_has_the_first_size_at_which_it_keeps_the_limits(monkeypatch):
     assert (c.excess, c.gram.tolist(), a.gram.tolist()) == (0.25, [[0.0]], [[1]])
     assert [names for _, names in d.asked] == [["a", "b", "c"], ["b", "c"], ["b", "c"], ["c"], ["c"]]
     assert d.tried == [a, b, c]
-    assert d.scored(SimpleNamespace(G=np.ones((1, 1))), plans[0]).size == designing.SMALLER[0]
+    assert d.scored(SimpleNamespace(G=np.ones((1, 1))), plans[:1])[0].size == designing.SMALLER[0]
 
 
 def test_the_first_plan_whose_spread_keeps_the_basin_is_taken():

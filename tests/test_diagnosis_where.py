@@ -16,6 +16,7 @@ from diagnosis.predictors import omega, uncertainty, weak_windows
 from diagnosis.predictors.ship_model import SampledForce
 from diagnosis.predictors.uncertainty import bridged
 from diagnosis.predictors.weak_form import halfway
+from diagnosis.runs.run_constants import BLOCK
 
 
 def windows(run):
@@ -295,9 +296,9 @@ def test_a_region_in_words(covariate, low, high, phrase):
 
 
 def test_bins_are_eighths_of_the_windows_of_the_circle_or_fifteen_seconds():
-    assert SPEED.bin_edges(np.arange(81.0) ** 2) == pytest.approx((10.0 * np.arange(9.0)) ** 2)
-    assert SPEED.bin_edges(np.ones(81)).tolist() == [1.0]
-    assert HEADING.bin_edges(np.zeros(3)) == pytest.approx(0.25 * np.pi * np.arange(-4, 5))
+    assert SPEED.bin_edges(np.arange(81.0) ** 2, BLOCK) == pytest.approx((10.0 * np.arange(9.0)) ** 2)
+    assert SPEED.bin_edges(np.ones(81), BLOCK).tolist() == [1.0]
+    assert HEADING.bin_edges(np.zeros(3), BLOCK) == pytest.approx(0.25 * np.pi * np.arange(-4, 5))
     for seconds, bins in ((14.0, 1), (29.0, 1), (31.0, 2), (100.0, 6), (1e4, 16)):
-        edges = TIME.bin_edges(7.0 + np.array([0.0, 0.3, 1.0]) * seconds)
+        edges = TIME.bin_edges(7.0 + np.array([0.0, 0.3, 1.0]) * seconds, BLOCK)
         assert edges == pytest.approx(np.linspace(7.0, 7.0 + seconds, bins + 1))

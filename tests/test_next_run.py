@@ -290,8 +290,8 @@ def test_running_astern_discriminates_what_running_ahead_does_not(designer):
     d, k = designer
     assert {h.ids for h in k.hypotheses} == {("X_|u|u",), ("X_uu",)}
     assert k.weights == pytest.approx(0.5, abs=1e-3)
-    astern = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)])
-    around = d.scored(k, usual("circle", SECONDS))
+    astern = d.scored(k, [[PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)]])[0]
+    around = d.scored(k, [usual("circle", SECONDS)])[0]
     assert astern.excess == around.excess == 0.0
     assert astern.score > 0.9 > 0.1 > around.score
     d.tried[:] = [around]
@@ -305,8 +305,8 @@ def rehearsed(question, designer):
     """What learn would report, a run astern and one around."""
     d, k = designer
     plans = (
-        d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)]),
-        d.scored(k, usual("circle", SECONDS)),
+        d.scored(k, [[PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)]])[0],
+        d.scored(k, [usual("circle", SECONDS)])[0],
     )
     return Rehearsal(question.data, d.space, k), *(d.windows(s.motion) for s in plans)
 
@@ -383,7 +383,7 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
     d, k = designer
     fast = replace(d, tried=[])
     fast.reach = d.reach._replace(speed=3.0, rate=3.0)
-    found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, SECONDS, 0.0)])
+    found = fast.scored(k, [[PlanStep("legs", (1.0,) * NUMBERS, SECONDS, 0.0)]])[0]
     assert found.excess > 0.0
     assert found.score < -1.0, "below any plan that keeps the limits"
     assert not found.gram.any()
@@ -407,7 +407,7 @@ def test_the_planned_motion_is_what_its_thrust_gives():
 
 def test_a_faster_motion_has_the_same_track(designer):
     d, _ = designer
-    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), BRIEF)
+    slow = d.motions([[PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)]], (1.0, 1.0), BRIEF)[0]
     fast = slow.faster(1.2)
     h = float(fast.time[1] - fast.time[0])
     assert fast.eta == pytest.approx(slow.eta)
@@ -418,8 +418,8 @@ def test_a_faster_motion_has_the_same_track(designer):
 def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, monkeypatch):
     """A ship that is lost at any speed above that of the plan is outside of every basin."""
     d, k = designer
-    s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)])
-    track = d.motion(s.steps, s.size, BRIEF)
+    s = d.scored(k, [[PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)]])[0]
+    track = d.motions([s.steps], s.size, BRIEF)[0]
 
     def lost(models, motion):
         eta = np.tile(track.eta, (len(models), 1, 1))
@@ -467,7 +467,7 @@ def test_runs_needed_are_counted_at_first_and_for_all_larger_numbers():
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
     d, k = designer
     models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]
-    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), BRIEF)
+    motion = d.motions([[PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)]], (1.0, 1.0), BRIEF)[0]
     short = PlannedMotion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
     together = followed(models, short)
     for n, model in enumerate(models):
@@ -479,7 +479,7 @@ def test_no_simulated_ship_leaves_the_basin(designer):
     """A plan that keeps the basin with the spread of its draws keeps it with draws of another seed."""
     d, k = designer
     rng = np.random.default_rng(3)
-    plans = (d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), SECONDS)) for _ in range(50))
+    plans = (d.scored(k, [sequence(rng.random(2 * (NUMBERS + 2)), SECONDS)])[0] for _ in range(50))
     kept = next(s for s in plans if s.excess == 0.0 and d.spread(k, s, 0).margin.min() > 0.0)
     assert d.spread(k, kept, 99).margin.min() > 0.0
 
@@ -670,7 +670,7 @@ def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
     rng, craft = np.random.default_rng(1), d.model.ship
     for _ in range(2):
         plan = sequence(rng.random(2 * DIMENSIONS), d.limits.seconds, d.library)
-        asked = d.motion(plan, (1.0, 1.0), BRIEF * d.scale).orders
+        asked = d.motions([plan], (1.0, 1.0), BRIEF * d.scale)[0].orders
         if craft.description.allocates:
             assert not asked[:, 1].any()  # no force sideways
         else:
@@ -682,7 +682,7 @@ def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
 
 def test_steps_of_the_thrust_discriminate_what_one_speed_does_not(steering):
     d, k = steering
-    steps = d.scored(k, [PlanStep("straight", (0.0, 0.5, 1.0, 0.0, 0.0), d.limits.seconds, 0.0)])
+    steps = d.scored(k, [[PlanStep("straight", (0.0, 0.5, 1.0, 0.0, 0.0), d.limits.seconds, 0.0)]])[0]
     around = d.usual(k, "circle")
     assert steps.excess == around.excess == 0.0
     assert steps.score > around.score
@@ -736,7 +736,7 @@ def test_a_planned_run_is_a_scenario_that_plays_its_table(names, tmp_path):
 @pytest.mark.parametrize("steering", [("kvlcc2", (9.0, 0.15))], indirect=True)
 def test_orders_of_a_plan_give_its_track(steering, tmp_path):
     d, k = steering
-    found = d.scored(k, [PlanStep("swing", (0.5,) * NUMBERS, d.limits.seconds, 0.3)])
+    found = d.scored(k, [[PlanStep("swing", (0.5,) * NUMBERS, d.limits.seconds, 0.3)]])[0]
     write_run(d, found, 1, tmp_path, d.model.ship.name)
     scenario = tmp_path / "scenario_1.json"
     stop = 400 * json.loads(scenario.read_text())["step"]

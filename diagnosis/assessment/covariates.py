@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.scale import REFERENCE, Scale
+from fmus.scale import Scale
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import BLOCK
@@ -24,7 +24,7 @@ class Covariate:
     Attributes:
         id: its name in results.
         unit: of its values.
-        bin_edges: from values (K,) and the size of the ship to the edges (bins + 1,) of the bins.
+        bin_edges: from values (K,) and the length of a block [s] to the edges (bins + 1,) of the bins.
         above, below, between: phrases for a region, with places for its ends.
         bounded: whether a region may have two ends; else it is open to one side.
         cyclic: whether the last bin is next to the first.
@@ -32,7 +32,7 @@ class Covariate:
 
     id: str
     unit: str
-    bin_edges: Callable[..., np.ndarray]
+    bin_edges: Callable[[np.ndarray, float], np.ndarray]
     above: str
     below: str
     between: str
@@ -48,17 +48,17 @@ class Covariate:
         return 1.0 / UNITS[quantity][shown]
 
 
-def _quantiles(x: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+def _quantiles(x: np.ndarray, block: float) -> np.ndarray:
     return np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
 
 
-def _intervals(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+def _intervals(t: np.ndarray, block: float) -> np.ndarray:
     """Bins no shorter than a block of the cross-validation, as shorter ones are not independent."""
-    bins = int(np.clip((t.max() - t.min()) // (BLOCK * scale.time), 1, 2 * BINS))
+    bins = int(np.clip((t.max() - t.min()) // block, 1, 2 * BINS))
     return np.linspace(t.min(), t.max(), bins + 1)
 
 
-def _sectors(psi: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+def _sectors(psi: np.ndarray, block: float) -> np.ndarray:
     return np.linspace(-np.pi, np.pi, BINS + 1)
 
 
@@ -100,7 +100,7 @@ class CovariateValues:
     @property
     def edges(self) -> np.ndarray:
         """(bins + 1,), in the covariate's unit."""
-        return self.covariate.bin_edges(self.values, self.scale)
+        return self.covariate.bin_edges(self.values, BLOCK * self.scale.time)
 
 
 def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues]]:

@@ -183,13 +183,8 @@ class Designer:
         """Usual runs of such a ship."""
         return USUAL_MANOEUVRES if self.orders is None else USUAL_ORDERS
 
-    def motion(self, steps: Sequence[PlanStep], size: Size, h: float) -> PlannedMotion:
-        """The motion of a plan every h [s], at shares of the largest speeds and of the room."""
-        (found,) = self._motions([steps], size, h)
-        return found
-
-    def _motions(self, plans: Sequence[Sequence[PlanStep]], size: Size, h: float) -> list[PlannedMotion]:
-        """The motion of each of several plans, see :meth:`motion`."""
+    def motions(self, plans: Sequence[Sequence[PlanStep]], size: Size, h: float) -> list[PlannedMotion]:
+        """The motion of each plan every h [s], at shares of the largest speeds and of the room."""
         (pace, room), T = size, self.limits.seconds
         if self.orders is not None:
             return self.orders.motions(plans, T, h, pace, self.model, self.basin)
@@ -197,19 +192,14 @@ class Designer:
         smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
         return [PlannedMotion.along(poses(steps, T, h, smaller), h, self.basin) for steps in plans]
 
-    def scored(self, k: Knowledge, steps: Sequence[PlanStep]) -> ScoredPlan:
-        """A plan, evaluated at the largest speeds at which it keeps the limits."""
-        (found,) = self.scored_all(k, [steps])
-        return found
-
-    def scored_all(
+    def scored(
         self, k: Knowledge, plans: Sequence[Sequence[PlanStep]], sizes: Sequence[Size] = SMALLER
     ) -> list[ScoredPlan]:
-        """Several plans, each with the first of some sizes that keeps the limits, else the last."""
+        """Each plan, evaluated at the first of some sizes that keeps the limits, else at the last."""
         found: dict[int, ScoredPlan] = {}
         for size in sizes:
             left = [n for n in range(len(plans)) if n not in found]
-            motions = self._motions([plans[n] for n in left], size, BRIEF * self.scale) if left else []
+            motions = self.motions([plans[n] for n in left], size, BRIEF * self.scale) if left else []
             for n, motion in zip(left, motions, strict=True):
                 excess = self.excess(motion)
                 if excess == 0.0:
@@ -265,7 +255,7 @@ class Designer:
             self.advance(f"searching a plan: {len(found)} of {len(first) + evolved}")
             each = np.clip(some.T.reshape(-1, first.shape[1]), 0.0, 1.0 - 1e-9)
             plans = [sequence(point, T, self.library) for point in each]
-            found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
+            found.extend(zip(scored := self.scored(k, plans), each, strict=True))
             costs = np.array([-s.score for s in scored])
             return costs if some.ndim > 1 else float(costs[0])
 
@@ -288,11 +278,11 @@ class Designer:
 
     def usual(self, k: Knowledge, name: str) -> ScoredPlan:
         """A usual run of the same length."""
-        return self.scored(k, usual(name, self.limits.seconds, self.usual_runs))
+        return self.scored(k, [usual(name, self.limits.seconds, self.usual_runs)])[0]
 
     def spread(self, k: Knowledge, s: ScoredPlan, seed: int) -> Spread:
         """The tracks of a plan under every likely hypothesis."""
-        motion = self.motion(s.steps, s.size, BRIEF * self.scale)
+        (motion,) = self.motions([s.steps], s.size, BRIEF * self.scale)
         likely = [n for n, w in enumerate(k.weights) if w > NEGLIGIBLE] or [int(np.argmax(k.weights))]
         self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
@@ -326,7 +316,7 @@ class Designer:
         """A plan at its own size, then at each smaller one that keeps the limits."""
         yield s
         for size in SMALLER[SMALLER.index(s.size) + 1 :]:
-            (smaller,) = self.scored_all(k, [s.steps], [size])
+            (smaller,) = self.scored(k, [s.steps], [size])
             if smaller.excess == 0.0:
                 yield smaller
 

@@ -41,7 +41,7 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     feed-forward. With orders, the track is that of this model.
     """
     h = LONGEST_STEP * d.scale
-    fine = d.motion(found.steps, found.size, h)
+    (fine,) = d.motions([found.steps], found.size, h)
     orders = d.orders
     if orders is None:
         parts = [fine.eta_dot, fine.eta_ddot, fine.thrust(d.model)]

@@ -13,7 +13,6 @@ from cosim.interrupts import raise_if_interrupted
 Advance = Callable[[str], None]
 # s between two lines where there is no terminal; chosen: nobody thinks that it hangs.
 EVERY = 30.0
-MARGIN = 16  # 1, characters of a line for spinner and elapsed time
 
 
 def silent(what: str) -> None:
@@ -55,12 +54,12 @@ class ProgressLine:
 @contextmanager
 def progress(console: Console) -> Iterator[ProgressLine]:
     """A progress callback that is shown until the end."""
-    # Long names of runs leave room for the time.
-    described = Column(no_wrap=True, overflow="ellipsis", max_width=max(console.width - MARGIN, 1))
+    described = Column(no_wrap=True, overflow="ellipsis", ratio=1)  # what the time leaves of the line
     columns = (
         SpinnerColumn(),
         TimeElapsedColumn(),
         TextColumn("{task.description}", markup=False, table_column=described),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    shown = console.is_terminal
+    with Progress(*columns, console=console, transient=True, expand=True, disable=not shown) as bar:
         yield ProgressLine(console, bar)
