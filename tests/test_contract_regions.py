@@ -215,7 +215,7 @@ def test_an_error_is_more_than_noise_by_the_clusters_mean():
 
 def found(monkeypatch, *squares, std=0.01):
     """Regions of errors (K,) of each axis in two halves of a run, over one covariate."""
-    by = CovariateValues(SPEED, np.arange(VALUES.size), VALUES, None, REFERENCE)
+    by = CovariateValues(SPEED, np.arange(VALUES.size), VALUES, REFERENCE)
     monkeypatch.setattr(regions, "covariates_by_axis", lambda _: [[by]] * 3)
     data = [SimpleNamespace(block=2 * CLUSTER), SimpleNamespace(block=np.zeros(0, int))]
     omega = np.sqrt(np.column_stack(squares))

@@ -30,7 +30,7 @@ class Designs(Designer):
             model=SimpleNamespace(ship=SimpleNamespace(scale=SimpleNamespace(time=1.0))), score=score, asked=[], tried=[],
         )  # fmt: skip
 
-    def scored_all(self, k, plans):
+    def scored(self, k, plans):
         self.asked.append(len(plans))
         found = [self.score(plan) for plan in plans]
         self.tried += found
@@ -95,9 +95,9 @@ class Sized(Designs):
         self.space = SimpleNamespace(gram=lambda windows: np.array([[len(windows)]]))
         self.criterion = "certainty"
 
-    scored_all = Designer.scored_all
+    scored = Designer.scored
 
-    def _motions(self, plans, size, h):
+    def motions(self, plans, size, h):
         self.asked.append((size, [p[0].name for p in plans]))
         return [(p[0].name, size) for p in plans]
 

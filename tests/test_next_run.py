@@ -708,7 +708,7 @@ def test_a_planned_run_is_a_scenario_that_plays_its_table(names, tmp_path):
     }
     noise = np.array([0.01, 0.02, 0.003])
     d = SimpleNamespace(
-        scale=2.0, model=3.0, motion=lambda *plan: motions[plan], limits=SimpleNamespace(seconds=2.0),
+        scale=2.0, model=3.0, motions=lambda plans, *how: [motions[(*plans, *how)]], limits=SimpleNamespace(seconds=2.0),
         orders=SimpleNamespace(names=names) if names else None,
         data=[SimpleNamespace(smoothed=SimpleNamespace(noise=noise))],
     )  # fmt: skip
