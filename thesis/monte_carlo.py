@@ -139,22 +139,22 @@ class SampleMean(NamedTuple):
         return f"{self.mean:.3g} [{self.low:.3g}, {self.high:.3g}]"
 
 
-def interval(values: Sequence[float], level: float = 0.95) -> SampleMean:
+def interval(values: Sequence[float]) -> SampleMean:
     """Mean of independent values with its Student t interval, which one value leaves open."""
     x = np.asarray(values, float)
     mean = float(x.mean())
     if x.size < 2 or not np.isfinite(x).all():
         return SampleMean(mean, -math.inf, math.inf)
-    half = float(stats.t.ppf(0.5 + 0.5 * level, x.size - 1) * x.std(ddof=1) / math.sqrt(x.size))
+    half = float(stats.t.ppf(0.975, x.size - 1) * x.std(ddof=1) / math.sqrt(x.size))
     return SampleMean(mean, mean - half, mean + half)
 
 
-def paired(a: Sequence[float], b: Sequence[float], level: float = 0.95) -> SampleMean:
+def paired(a: Sequence[float], b: Sequence[float]) -> SampleMean:
     """Interval of the mean of a - b, where both were run with the same seeds in the same order."""
-    return interval(np.subtract(a, b).tolist(), level)
+    return interval(np.subtract(a, b).tolist())
 
 
-def ratio(a: Sequence[float], b: Sequence[float], level: float = 0.95) -> SampleMean:
+def ratio(a: Sequence[float], b: Sequence[float]) -> SampleMean:
     """Interval of the geometric mean of a/b over the same seeds, for positive values."""
     logs = np.log(np.divide(a, b)).tolist()
-    return SampleMean(*(math.exp(x) for x in interval(logs, level)))
+    return SampleMean(*(math.exp(x) for x in interval(logs)))

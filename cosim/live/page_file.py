@@ -26,7 +26,7 @@ PROGRAMS = ("loop.js", "metrics.js", "view.js")  # one program, in this order
 LARGEST = 3_000_000  # bytes of a page; chosen: it can be sent by mail
 
 
-def write_live_page(system: System, path: Path, overrides: Overrides = ()) -> Path:
+def write_live_page(system: System, path: Path, overrides: Overrides) -> Path:
     """Write a page in which a scenario runs in a browser.
 
     Args:

@@ -120,7 +120,7 @@ def outcome_of_log(
         raise MetricsError(str(error)) from None
 
 
-def simulated_trial(folder: Path, start: float | None = None, stop: float | None = None) -> TrialOutcome:
+def simulated_trial(folder: Path, start: float | None, stop: float | None) -> TrialOutcome:
     """The trial that a finished run is.
 
     Args:

@@ -62,14 +62,14 @@ def replayed(component: Component, log: Log, values: dict[str, float]) -> tuple[
     return np.array(sigma), state
 
 
-def spike_times(log: Log, size: float = 0.1) -> np.ndarray:
-    """When a single sample of the measured north position stands out by about ``size`` [m].
+def spike_times(log: Log) -> np.ndarray:
+    """When a single sample of the measured north position stands out by about 0.1 m.
 
     The jump at the end of a freeze has one side only.
     """
     x, t = log["observer.x_m"], log["time"]
     before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
-    return t[1:-1][np.fmin(np.abs(before), np.abs(after)) * (before * after > 0.0) > 0.5 * size]
+    return t[1:-1][np.fmin(np.abs(before), np.abs(after)) * (before * after > 0.0) > 0.05]
 
 
 def echo(times: np.ndarray, spikes: np.ndarray) -> np.ndarray:

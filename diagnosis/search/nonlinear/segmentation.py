@@ -256,7 +256,7 @@ def intervals(p: SegmentationProblem) -> Spans:
     return spans
 
 
-def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False) -> Spans:
+def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool) -> Spans:
     """Intervals of bins that gain (B,) the most, less a charge for each change, by dynamic programming.
 
     There are so many at the most. The end of the data is no change; those that last have no other end.
