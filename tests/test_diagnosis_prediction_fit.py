@@ -321,6 +321,13 @@ def test_runs_of_one_speed_or_none_show_no_growth_of_a_disturbance():
     assert one.at(np.array([0.0, 3.0])).size == pytest.approx(np.full((2, 3), 2.0))
 
 
+@pytest.mark.parametrize("scale", [1e-3, 0.3, 20.0])
+def test_exponential_of_matrices_is_that_of_scipy(scale):
+    A = scale * np.random.default_rng(0).normal(size=(4, 2, 5, 5)) - scale * 2.0 * np.eye(5)
+    assert pushes._exponential(A) == pytest.approx(expm(A), rel=1e-7, abs=1e-9)
+    assert pushes._exponential(np.zeros((3, 3))).tolist() == np.eye(3).tolist()
+
+
 @pytest.mark.parametrize("beyond", [np.nan, np.inf, 1e4])
 def test_exponential_of_what_runs_away_is_not_known_and_others_are(beyond):
     A = np.random.default_rng(0).standard_normal((2, 3, 3, 3))

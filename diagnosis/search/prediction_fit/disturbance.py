@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import nnls
 
 from ...predictors import WeakWindows
@@ -151,10 +150,18 @@ def _steps(motion: Linear, disturbance: ForceDisturbance) -> tuple[np.ndarray, n
 
 
 def _exponential(A: np.ndarray) -> np.ndarray:
-    """exp(A) of matrices (..., n, n).
+    """exp(A) of matrices (..., n, n), by scaling and squaring of a Taylor series of sixth order.
 
     NaN where it may be beyond all numbers, as along the prediction of a ship that runs away.
     """
-    size = np.abs(A).sum(axis=-1, keepdims=True).max(axis=-2, keepdims=True)
-    known = size < np.log(np.finfo(float).max)
-    return np.where(known, expm(np.where(known, A, 0.0)), np.nan)
+    size = np.abs(A).sum(axis=-1).max(axis=-1)
+    known = (size < np.log(np.finfo(float).max))[..., None, None]
+    largest = max(np.max(size, where=known[..., 0, 0], initial=0.0), 1e-9)
+    halvings = max(0, int(np.ceil(np.log2(largest))) + 1)
+    X, one = np.where(known, A, 0.0) / 2.0**halvings, np.eye(A.shape[-1])
+    found = one + X / 6.0
+    for k in range(5, 0, -1):
+        found = one + X @ found / k
+    for _ in range(halvings):
+        found = found @ found
+    return np.where(known, found, np.nan)
