@@ -2,7 +2,7 @@
 
 Numbers are counted in the syntax tree, wherever they are, so that moving one is no removal: constants
 of modules, fields of settings, defaults of arguments, literals within functions, data files. An index
-does not count.
+does not count, nor does what follows from named constants alone.
 """
 
 import argparse
@@ -80,7 +80,7 @@ def is_number(node: ast.AST) -> bool:
 
 
 def size(node: ast.AST) -> int:
-    """Numbers in an expression: arithmetic on numbers is one, a tuple has as many as are in it."""
+    """Numbers in an expression: arithmetic is one at most, a tuple has as many as are in it."""
     if isinstance(node, ast.Subscript):
         return size(node.value)
     if isinstance(node, ast.Lambda) or (
@@ -89,8 +89,15 @@ def size(node: ast.AST) -> int:
         return 0  # literals of a function; names of indices
     parts = [size(child) for child in ast.iter_child_nodes(node)]
     if isinstance(node, (ast.BinOp, ast.UnaryOp)):
-        return max(parts)
+        return 0 if is_derived(node) else max(parts)
     return int(is_number(node)) + sum(parts)
+
+
+def is_derived(node: ast.AST) -> bool:
+    """Whether an expression follows from named constants by small numbers: a double, a square."""
+    parts = [*ast.walk(node)]
+    named = any(isinstance(n, ast.Name) and n.id.isupper() for n in parts)
+    return named and all(small(n) for n in parts if is_number(n))
 
 
 class Reader(ast.NodeVisitor):

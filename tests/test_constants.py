@@ -46,6 +46,8 @@ SEARCH = Search(chance=0.01, width=3.0, every=0.5)
         ("A = np.array([1.0, 2.0]) / 6.0", {"module": 2}),
         ("A = {'a': 1.0, 'b': [2.0, 3.0]}", {"module": 3}),
         ("A = B[3]", {}),
+        ("A = 2 * B - 1.0, round(1.0 / B), B**2", {}),
+        ("A = 3.0 * B, 2.0 * np.pi, (B, 0.0)", {"module": 3}),
         ("A, B, C = range(3)", {}),
         ("A = True, None, '3'", {}),
         ("A = sorted(B, key=lambda b: b * 3.0 + 1.0)", {"literal": 1}),

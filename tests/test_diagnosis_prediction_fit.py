@@ -17,9 +17,10 @@ from benchmarks.ship_effects import sail as sail_of
 from diagnosis import Smoothed, load
 from diagnosis.predictors import Model, ship_with, shooting, weak_windows
 from diagnosis.predictors.prediction import WindowStarts, at_rest
-from diagnosis.predictors.shooting import ACCURATE, PARTS, Linear, Shooting
+from diagnosis.predictors.shooting import PARTS, Linear, Shooting
 from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
+from diagnosis.runs.run_constants import NEGLIGIBLE
 from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Finding, Findings, Suspect
 from diagnosis.search.gram import block_folds
@@ -233,8 +234,8 @@ def test_steps_are_short_where_commands_change_within_them(half, longest):
     exact = coarse.in_parts(32 * PARTS).residuals(model)
     size = np.sqrt(np.mean(exact**2))
     near, far = (np.sqrt(np.mean((s.residuals(model) - exact) ** 2)) / size for s in (found, coarse))
-    assert near < 2.0 * ACCURATE
-    assert (far < 2.0 * ACCURATE) == longest
+    assert near < 2.0 * NEGLIGIBLE
+    assert (far < 2.0 * NEGLIGIBLE) == longest
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

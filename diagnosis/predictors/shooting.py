@@ -15,7 +15,7 @@ from fmus.ops import wrap
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from ..runs.run_constants import DIGITS
+from ..runs.run_constants import DIGITS, NEGLIGIBLE
 from .prediction import WindowStarts, arriving, filtered, propagate, stacked
 from .ship_model import Model, parameter_and_run
 from .thrust import Response
@@ -26,7 +26,6 @@ INSTANTS = 16  # 1, of a window at which pose and prediction are compared
 # 1, steps between two instants: at least a tenth of the quickest motion's time in the longest windows;
 # at most, where a command that changes within a step has other effects than its mean.
 PARTS, MOST_PARTS = 4, 64
-ACCURATE = 0.05  # 1, change of predictions by half the step, as a share of the residuals; chosen
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
 
 
@@ -105,7 +104,7 @@ class Shooting:
             finer = found.in_parts(2 * found.parts)
             coarse, residuals = residuals, finer.residuals(model)
             changes, left = _squares(_off(residuals, coarse)), _squares(residuals)
-            if (changes <= ACCURATE**2 * left).all():
+            if (changes <= NEGLIGIBLE**2 * left).all():
                 break
             found = finer
         return found

@@ -14,8 +14,8 @@ HORIZON = 8.0
 CHANCE = 0.01
 LEVEL = 0.95  # 1, probability of the intervals of values, and of the sets of ids; contract
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
-# from a limit. The same for commands and windows, what must be explained, a command before the run, and
-# numbers above their limits.
+# from a limit. The same for commands and windows, what must be explained, a command before the run,
+# numbers above their limits, and a change of predictions by half the step over the residuals.
 NEGLIGIBLE = 0.05
 DIGITS = math.sqrt(sys.float_info.epsilon)  # 1, relative size of what rounding may have left
 ORDER = 3  # 1, of the derivative with a penalty, and of the differences that noise is estimated by

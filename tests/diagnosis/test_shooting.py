@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from diagnosis.predictors import shooting
 from diagnosis.predictors.shooting import (
-    ACCURATE,
     INSTANTS,
     MOST_PARTS,
     PARTS,
@@ -20,6 +19,7 @@ from diagnosis.predictors.shooting import (
     _slopes,
     _squares,
 )
+from diagnosis.runs.run_constants import NEGLIGIBLE
 from fmus.scale import REFERENCE, Scale
 from fmus.vessel import vessel
 
@@ -180,7 +180,7 @@ def test_steps_are_halved_until_predictions_hardly_change(size):
     """By less than a twentieth of the residuals."""
     found = made(lambda parts: size / parts**2).accurate([], 8.0, None)
     parts = PARTS
-    while parts < MOST_PARTS and size / parts**2 - size / (2 * parts) ** 2 > ACCURATE * (
+    while parts < MOST_PARTS and size / parts**2 - size / (2 * parts) ** 2 > NEGLIGIBLE * (
         1.0 + size / (2 * parts) ** 2
     ):
         parts *= 2
