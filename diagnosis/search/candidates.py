@@ -23,7 +23,7 @@ from ..runs.run_constants import NEGLIGIBLE
 from .nonlinear.multistart import MULTIPLES, Landscape, best_values, limits
 from .nonlinear.segmentation import intervals, problem
 
-# Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
+# Here forces and coefficients are in their units at the size of the ship, see :meth:`.Model.unit`.
 SLIGHT = np.finfo(float).eps  # sum of squares of a force, in the units above, that is rounding
 
 

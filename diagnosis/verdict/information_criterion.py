@@ -14,7 +14,7 @@ CHARGED = "the model fits {where} worse, or not better by the cost of its parame
 
 
 def harm(its: Losses, others: Losses, more: int) -> str:
-    """Whether a model has the higher criterion; arguments and result as of ``paired_errors``."""
+    """Whether a model has the higher criterion; arguments and result as of :class:`.Harm`."""
     known = np.isfinite(others.omega)
     difference = float(np.sum((its.omega - others.omega)[known]))
     return CHARGED if not difference + more * np.log(max(its.omega.size, 1)) <= 0.0 else ""
