@@ -68,7 +68,7 @@ class Bands(ShortRepr):
         around = np.linspace(0.0, 2.0 * np.pi)
         circle = np.sqrt(chdtri(2, 1.0 - level)) * np.column_stack([np.cos(around), np.sin(around)])
         V = self.covariance[window, :, :2, :2]
-        known: np.ndarray = np.isfinite(V).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(V).all(axis=(1, 2)))
         squares, axes = np.linalg.eigh(np.where(known[:, None, None], V, 0.0))
         lengths = np.where(known[:, None], np.sqrt(np.maximum(squares, 0.0)), np.nan)
         factor = axes * lengths[:, None, :]
