@@ -30,9 +30,9 @@ class Designs(Designer):
             model=SimpleNamespace(ship=SimpleNamespace(scale=SimpleNamespace(time=1.0))), score=score, asked=[], tried=[],
         )  # fmt: skip
 
-    def scored(self, k, plans):
+    def scored(self, k, plans, sizes=((1.0, 1.0),)):
         self.asked.append(len(plans))
-        found = [self.score(plan) for plan in plans]
+        found = [replace(self.score(plan), size=sizes[0]) for plan in plans]
         self.tried += found
         return found
 
@@ -127,25 +127,43 @@ def test_a_plan_has_the_first_size_at_which_it_keeps_the_limits(monkeypatch):
 
 
 def test_the_first_plan_whose_spread_keeps_the_basin_is_taken():
+    """Each is tried slower and in less room before the next one; the usual runs come last."""
     d = Designs(by_first)
-    plans = [
-        replace(by_first([PlanStep("legs", (0.3,), 1.0, 0.0)]), score=s) for s in (0.9, 0.8, 0.7, 0.6)
-    ]
+    plan = [PlanStep("legs", (0.3,), 1.0, 0.0)]
+    plans = [replace(by_first(plan), score=s) for s in (0.9, 0.8, 0.7, 0.6, 0.5)]
     plans[2] = replace(plans[2], excess=0.1)
-    d.tried = [plans[3], plans[2], plans[1]]
-    asked = []
+    d.tried = plans[::-1]
+    of_names = {"eight": 0.1, "circle": 0.2, "zig-zag": 0.3}
+    d.__dict__["usual"] = lambda k, name: replace(by_first(plan), score=of_names.get(name, 0.0))
+    best = d.best(None, plans[0])
+    assert [s.score for s in best[: designing.REFINED]] == [0.9, 0.8, 0.6]
+    assert [s.score for s in best[designing.REFINED :]][:3] == [0.3, 0.2, 0.1]
+
+    asked, kept = [], set()
 
     def spread(k, s, seed):
-        asked.append(s.score)
-        return SimpleNamespace(margin=np.array([0.2, d.margins[s.score]]))
+        asked.append((s.score, s.size))
+        return SimpleNamespace(margin=np.array([0.2, 0.1 if asked[-1] in kept else 0.0]))
 
     d.__dict__["spread"] = spread
-    d.__dict__["margins"] = {0.9: 0.0, 0.8: -0.1, 0.6: 0.1}
-    found, tracks = d.checked(None, plans[0], 0, tries=3)
-    assert (found.score, tracks.margin[1]) == (0.6, 0.1)
-    assert asked == [0.9, 0.8, 0.6]
+    first, *smaller = designing.SMALLER
+    for size in designing.SMALLER:
+        kept.clear()
+        kept.add((0.9 if size == first else 0.0, size))
+        asked.clear()
+        found, tracks = d.checked(None, [plans[0]], 0)
+        assert (found.size, tracks.margin[1]) == (size, 0.1)
+        assert [s for _, s in asked] == [*designing.SMALLER[: designing.SMALLER.index(size) + 1]]
+    kept.clear()
+    asked.clear()
     with pytest.raises(InputError, match="leaves the basin"):
-        d.checked(None, plans[0], 0, tries=2)
+        d.checked(None, best[:2], 0)
+    assert asked == [
+        (0.9, first),
+        *((0.0, s) for s in smaller),
+        (0.8, first),
+        *((0.0, s) for s in smaller),
+    ]
 
 
 # Profiles

@@ -33,15 +33,16 @@ class Fine:
 def designer(orders=None, scale=1.0, seconds=20.0):
     asked = []
 
-    def motion(steps, size, h):
-        asked.append((steps, size, h))
-        return Fine(h, None if orders is None else 400.0 + np.arange(2.0 * N).reshape(N, 2))
+    def motions(plans, size, h):
+        asked.extend((steps, size, h) for steps in plans)
+        numbers = None if orders is None else 400.0 + np.arange(2.0 * N).reshape(N, 2)
+        return [Fine(h, numbers) for _ in plans]
 
     return SimpleNamespace(
         scale=scale,
         orders=orders,
         model="likeliest",
-        motion=motion,
+        motions=motions,
         asked=asked,
         data=[SimpleNamespace(smoothed=SimpleNamespace(noise=np.array([0.1, 0.2, 0.3])))],
         limits=SimpleNamespace(seconds=seconds),
