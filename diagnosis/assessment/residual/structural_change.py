@@ -20,7 +20,7 @@ from ...predictors.weak_form import BLOCK, EVERY
 from ...runs.run_constants import CHANCE, NEGLIGIBLE
 from ..settings import SETTINGS
 
-DEGREE = 3  # 1, of the polynomial of a drift: the least with a change to and fro
+CUBIC = 3  # 1, degree of the polynomial of a drift: the least with a change to and fro
 STRETCH = round(BLOCK / (2 * EVERY))  # windows between moments that are tried, of one amplitude
 
 
@@ -56,7 +56,7 @@ def moment_of_change(
     found, (own, x) = changes[k], parts[k]
     if not 3 * STRETCH <= found.row <= len(x) - 3 * STRETCH:
         return None  # at an edge of what is tried: what lies beyond may be the start of a run
-    drift = np.hstack([x * (np.linspace(-1.0, 1.0, len(x)) ** k)[:, None] for k in range(DEGREE + 1)])
+    drift = np.hstack([x * (np.linspace(-1.0, 1.0, len(x)) ** k)[:, None] for k in range(CUBIC + 1)])
     halves = _halves(own, x, found.row)
     rest = sum(float(np.sum(_rest(*half) ** 2)) for half in halves)
     changes_once = (
