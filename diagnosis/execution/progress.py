@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Column
 
 from cosim.interrupts import raise_if_interrupted
@@ -56,7 +56,7 @@ def progress(console: Console) -> Iterator[ProgressLine]:
     """A progress callback that is shown until the end."""
     described = Column(no_wrap=True, overflow="ellipsis", ratio=1)  # what the time leaves of the line
     columns = (
-        SpinnerColumn(),
+        BarColumn(bar_width=20),  # it moves as long as the length of the work is not known
         TimeElapsedColumn(),
         TextColumn("{task.description}", markup=False, table_column=described),
     )
