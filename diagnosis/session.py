@@ -12,7 +12,7 @@ from typing_extensions import deprecated
 
 from cosim import InputError
 
-from .assessment.gathering import told_apart
+from .assessment.gathering import distinctly_named
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import in_halves, one_thread
@@ -179,7 +179,7 @@ def evaluate(
         InputError: the runs are so ill-conditioned that nothing can be computed of them; the FMU is not
             what it is taken for, or fails.
     """
-    every = told_apart([*runs, *held_out])
+    every = distinctly_named([*runs, *held_out])
     predictor = _source(model, every).on(every, advance)
     return _compared(predictor, every[: len(runs)], after, every[len(runs) :], advance)
 
@@ -393,7 +393,7 @@ def begin(
     Raises:
         InputError: too little data, or an argument that is not what it should be.
     """
-    runs = told_apart([*train, *validate, *held_out])
+    runs = distinctly_named([*train, *validate, *held_out])
     source = _source(model, runs)
     prior_shares((source.start or nominal(runs)).ship, prior)
     harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by

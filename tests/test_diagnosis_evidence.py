@@ -14,7 +14,7 @@ from diagnosis.predictors import Model
 from diagnosis.predictors.evaluation import Bands
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
-from diagnosis.search.effect_evidence import EffectEvidence, beside_unknown, evidence, variation
+from diagnosis.search.effect_evidence import EffectEvidence, evidence, variation, with_unknown_cause
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.prior import NominalPrior
 from diagnosis.verdict import coefficients
@@ -71,7 +71,7 @@ def test_beside_a_residual_an_effect_is_as_sure_as_unknown_causes_are_further_th
     """Unknown causes as dense as known ones: one known within the nearest, so many within what is left."""
 
     def probability_of(remains, nearest):
-        return beside_unknown(remains**2, nearest)
+        return with_unknown_cause(remains**2, nearest)
 
     sure = [probability_of(remains, nearest) for remains in np.linspace(0, 1.2, 25)]
     assert sure[0] == 1.0

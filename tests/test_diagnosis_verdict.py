@@ -38,7 +38,7 @@ from diagnosis.search.refinement import RefinedModel, at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging, law_in_parts
-from diagnosis.verdict.coefficients import spoils
+from diagnosis.verdict.coefficients import worsens_training_runs
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of, most_by_intervals
 from diagnosis.verdict.judging import (
     differing,
@@ -49,7 +49,7 @@ from diagnosis.verdict.judging import (
     verdict_name,
     with_confidence,
 )
-from diagnosis.verdict.law_in_parts import beside_possibility, mended, of_several, on_one_line
+from diagnosis.verdict.law_in_parts import next_to_possibility, of_several, on_one_line, shape_corrected
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.pruning_criteria import criterion
 from diagnosis.verdict.shares import falls_by_axis, replaceable
@@ -811,8 +811,10 @@ def test_effects_that_predict_one_of_their_runs_worse_spoil_it(second, spoilt):
     f = Finding("X_u", change, {}, 0.1, [], 0.5, 0.5)
     found = Findings([f], model=start.plus(change), sigma=np.array([0.1, 0.1, 0.05]))
     data = ValidationData(runs, [], start, found.sigma)
-    assert spoils(found, data) == spoilt
-    assert not spoils(replace(found, effects=[]), data), "without an effect nothing is paid for"
+    assert worsens_training_runs(found, data) == spoilt
+    assert not worsens_training_runs(replace(found, effects=[]), data), (
+        "without an effect nothing is paid for"
+    )
 
 
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])
@@ -1026,10 +1028,10 @@ def test_what_stated_deviations_of_a_coefficient_allow_mends_nothing(
     falls, squares = np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 0.01]]), np.array([[1.0] * 3, [0.1] * 3])
     alone = [Confidence(0.99, 0.99), Confidence(confidence, confidence)]
     found = Findings(made, model=start.plus({name: change}))
-    assert ("loss_yaw" in mended(found, start, falls, squares, alone)) == mends
+    assert ("loss_yaw" in shape_corrected(found, start, falls, squares, alone)) == mends
     if small == "N_|r|r":  # together with what the model's coefficient has already
         moved = replace(found, model=found.model.plus({"N_absr_r": change}))
-        assert "loss_yaw" in mended(moved, start, falls, squares, alone)
+        assert "loss_yaw" in shape_corrected(moved, start, falls, squares, alone)
 
 
 @pytest.mark.parametrize(
@@ -1062,30 +1064,32 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
     ]
     by_axis, sure = np.array([*falls.values()], float), [Confidence(0.99, 0.99)] * len(made)
     squares = np.array([[10.0, 10.0, 10.0], [9.0, 0.5, 1.0]])[:, :: -1 if "mass" in falls else 1]
-    assert mended(Findings(made), start, by_axis, squares, sure) == doubted
+    assert shape_corrected(Findings(made), start, by_axis, squares, sure) == doubted
     # Of some 50 candidates one is 2.8 standard deviations from zero by chance, or nearer.
     for z, mends in ((1.0, False), (2.5, False), (3.5, True)):
         half = {f.id: Z95 * 0.1 * np.sqrt(len(f.values)) / z for f in made}
         near = [
             replace(f, ci95=dict.fromkeys(f.values, (0.1 - half[f.id], 0.1 + half[f.id]))) for f in made
         ]
-        assert mended(Findings(near), start, by_axis, squares, sure) == (doubted if mends else {})
+        assert shape_corrected(Findings(near), start, by_axis, squares, sure) == (
+            doubted if mends else {}
+        )
     possible = [Confidence(0.3, 0.3)] * len(made)
-    assert not mended(Findings(made), start, by_axis, squares, possible)
+    assert not shape_corrected(Findings(made), start, by_axis, squares, possible)
     # On an axis without a force of the larger one, coefficients explain what that seems to.
     apart = squares.copy()
     apart[0] = 0.0
-    assert not mended(Findings(made), start, by_axis, apart, sure)
+    assert not shape_corrected(Findings(made), start, by_axis, apart, sure)
     # A possibility mends a finding as well, and has no confidence to lose.
     first = {i: share for i, share in doubted.items() if share < 1.0}
-    assert mended(Findings(made), start, by_axis, squares, [sure[0], possible[1]]) == first
-    seen = confidence_of(made[0], start, Doubts(mended=doubted))
+    assert shape_corrected(Findings(made), start, by_axis, squares, [sure[0], possible[1]]) == first
+    seen = confidence_of(made[0], start, Doubts(shape_corrected=doubted))
     assert seen.own == (0.5 if made[0].id in doubted else 0.99)
     # With evidence: what a smaller one explains counts as a residual.
     for nearest, odds in ((0.9, 1.0 / (1.0 + 0.1 / 0.9)), (0.05, 0.5)):
         known = EffectEvidence(0.999, 0.0, 0.0, nearest, 0.0)
         seen = confidence_of(
-            replace(made[0], evidence=known, set_evidence=known), start, Doubts(mended=doubted)
+            replace(made[0], evidence=known, set_evidence=known), start, Doubts(shape_corrected=doubted)
         )
         assert seen.own == pytest.approx(odds if doubted.get(made[0].id) == 0.1 else 0.99, abs=0.002)
 
@@ -1120,14 +1124,14 @@ def test_a_small_finding_is_no_surer_than_what_explains_most(explained, believed
     """
     made = [Finding(i, {}, {}, 0.99, [], 0.9, 0.9) for i in ("Y_uv", "loss_surge")]
     sure = [Confidence(0.99, 0.99) if each else Confidence(0.01, 0.3) for each in believed]
-    assert beside_possibility(Findings(made), explained, sure) == doubted
-    seen = confidence_of(made[1], Model(), Doubts(beside_possibility=doubted))
+    assert next_to_possibility(Findings(made), explained, sure) == doubted
+    seen = confidence_of(made[1], Model(), Doubts(next_to_possibility=doubted))
     assert seen.own == pytest.approx(0.99 * 0.3 if doubted else 0.99)
     assert seen.is_finding == (not doubted)
     assert bool(seen.doubt) == bool(doubted)
     of_a_run = replace(made[1], id="bow_failure", values={"bow_failure_time@a": 9.0})
     assert of_a_run.of_runs
-    assert not beside_possibility(Findings([made[0], of_a_run]), explained, sure)
+    assert not next_to_possibility(Findings([made[0], of_a_run]), explained, sure)
 
 
 @pytest.mark.parametrize(("other", "doubted"), [(1.1, True), (0.5, False), (-1.1, False)])

@@ -13,7 +13,7 @@ from diagnosis.predictors.prediction import before_filters, filtered, true_motio
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, omega_std
 from diagnosis.predictors.weak_form import HORIZON, omega, weak_windows
-from diagnosis.search.candidates import quieted
+from diagnosis.search.candidates import removed_noise
 
 LAGS = {"position_lag": 0.7, "heading_lag": 0.4}
 BEHIND = Model(measurement=LAGS)
@@ -163,7 +163,7 @@ def test_the_noise_that_a_tracker_takes_away_is_known():
     tracked = Model(measurement={"position_tracker": 0.5})
     made = [sail(120.0, h=0.1, noise=5.0, seed=seed)[0] for seed in range(8)]
     windows = [weak_windows(smoothed(run)) for run in made]
-    charge = np.mean([quieted([w], Model(), tracked) for w in windows], axis=0)
+    charge = np.mean([removed_noise([w], Model(), tracked) for w in windows], axis=0)
     fall = np.zeros(3)
     for a, b in zip(windows[::2], windows[1::2], strict=True):
         now, undone = (omega(a, m) - omega(b, m) for m in (Model(), tracked))
@@ -171,7 +171,7 @@ def test_the_noise_that_a_tracker_takes_away_is_known():
     assert (fall[:2] > 0.0).all()
     assert (charge[:2] > 0.7 * fall[:2]).all()
     assert (charge[:2] < NOISE_TOLERANCE**2 * 1.5 * fall[:2]).all()
-    assert quieted(windows, Model(), Model({"delta_X_u": -1.0, "heading_offset": 0.1})) is None
+    assert removed_noise(windows, Model(), Model({"delta_X_u": -1.0, "heading_offset": 0.1})) is None
 
 
 def test_poses_and_rates_become_body_fixed_speeds():

@@ -27,7 +27,7 @@ from diagnosis.report.headline import (
 )
 from diagnosis.report.pictures import figures, tracks
 from diagnosis.report.pictures.chart import Chart, Panel
-from diagnosis.report.reported_effect import fitted_beside, within_range
+from diagnosis.report.reported_effect import further_fitted_values, within_range
 from diagnosis.report.terminal import as_text, show_calibration, show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
@@ -343,7 +343,7 @@ def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     def said(posterior=SimpleNamespace(std={}), **values):
         learned = SimpleNamespace(model=start.plus(values))
         d = SimpleNamespace(start=start, learned=learned, speeds=(0.4, 0.1, 0.2), posterior=posterior)
-        return fitted_beside(d)
+        return further_fitted_values(d)
 
     assert said() == said(delta_X_uu=1.0) == []
     assert said(V_n=0.3) == ["The water moves at 0.3 m/s towards 0°."]

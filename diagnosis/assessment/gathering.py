@@ -127,7 +127,7 @@ def usable(
     return windows if anyway else refuse_implausible(windows, model)
 
 
-def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
+def distinctly_named(data: Sequence[WeakWindows]) -> list[WeakWindows]:
     """Runs of which no two have the same name: those that had it are numbered."""
     found, seen = [], Counter[str]()
     for w in data:

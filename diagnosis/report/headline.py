@@ -18,7 +18,7 @@ from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
 from .formatting import number, percent
 from .report_data import SHOWN_ERRORS, ReportData
-from .reported_effect import ReportedEffect, fitted_beside, is_fitted
+from .reported_effect import ReportedEffect, further_fitted_values, is_fitted
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
@@ -279,7 +279,7 @@ def headline(r: ReportData) -> str:
         remains = d.remainder.significant and not r.possibilities
         moved = d.learned.moved if d.refitted or r.possibilities else {}
         far = [f"{name} by {number(z, 2)}" for name, z in moved.items() if abs(z) > FAR_OFF]
-        beside = fitted_beside(d) if d.calibrated else []
+        beside = further_fitted_values(d) if d.calibrated else []
         further = BESIDE.format(" ".join(beside)) if beside else ""
         if far and d.refitted and not d.remainder.significant:
             return FAR_COEFFICIENTS.format(far=FAR_OFF, names=listed(far, "and")) + further

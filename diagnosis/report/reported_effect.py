@@ -92,7 +92,7 @@ def _as_fitted(d: Diagnosis, f: Finding) -> Finding:
     )
 
 
-def fitted_beside(d: Diagnosis) -> list[str]:
+def further_fitted_values(d: Diagnosis) -> list[str]:
     """What a calibrated model has of actuators, measurement and water, in words, a sentence each.
 
     An angle that matters in no manoeuvre is left out, and what is within its own uncertainty.

@@ -39,8 +39,8 @@ class CandidateShape:
         unit: (p,), what one unit of each is at the size of the ship.
         nuisance_offset: (q,), nuisance parameters together with what is given; None: as they are.
         precision: (p, p), prior precision of the fitted ones; None: 0.
-        quieted: (3,), sum of squares of the noise that the shape takes out of the model error, or None,
-            see :func:`quieted`.
+        removed_noise: (3,), sum of squares of the noise that the shape takes out of the model error, see
+            :func:`removed_noise`; None: none.
     """
 
     given: Mapping[str, float]
@@ -50,7 +50,7 @@ class CandidateShape:
     unit: np.ndarray
     nuisance_offset: np.ndarray | None = None
     precision: np.ndarray | None = None
-    quieted: np.ndarray | None = None
+    removed_noise: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def changed_error(
     )
 
 
-def quieted(data: Sequence[WeakWindows], model: Model, changed: Model) -> np.ndarray | None:
+def removed_noise(data: Sequence[WeakWindows], model: Model, changed: Model) -> np.ndarray | None:
     """Sum of squares (3,) of the noise that a change of the measurement's filters takes out of omega.
 
     To undo a filter is to filter the noise of the measurement as well. What becomes less of it is
@@ -111,8 +111,10 @@ def shape(
     steps = zip(fitted, (step * unit).tolist(), strict=True)
     columns = [(start - changed_error(data, model, start, {**given, n: h}, n)) / h for n, h in steps]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
-    offset, noise = (base - start, quieted(data, model, model.plus(given))) if given else (None, None)
-    return CandidateShape(dict(given), list(fitted), offset, stacked, unit, quieted=noise)
+    offset, noise = (
+        (base - start, removed_noise(data, model, model.plus(given))) if given else (None, None)
+    )
+    return CandidateShape(dict(given), list(fitted), offset, stacked, unit, removed_noise=noise)
 
 
 def covered(columns: np.ndarray) -> np.ndarray:

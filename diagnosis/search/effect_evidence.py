@@ -46,7 +46,7 @@ class EffectEvidence(NamedTuple):
     listed: float = 1.0
 
 
-def beside_unknown(left: float, nearest: float) -> float:
+def with_unknown_cause(left: float, nearest: float) -> float:
     """Probability of an effect beside causes that no candidate has.
 
     Unknown causes are taken to lie as close to the effect as the candidates do, of which one is within

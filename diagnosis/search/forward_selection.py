@@ -119,7 +119,7 @@ def search(
         if weighed is None:
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
             break
-        if foretold_by_others(weighed[2]):
+        if better_with_one_value(weighed[2]):
             of_all = of_one_value(ranking.candidates, start.ship)
             alike = weighted(t, ranking.table.sigma, ranking.base, ranking.nuisance, of_all)
             weighed = reweighted(t, at, alike) or weighed
@@ -149,13 +149,13 @@ def search(
         del accepted[-1]
     at = refit(t, at, nuisance_of(t, at, t.error(at))).estimate
     for k, p in enumerate(accepted):
-        at, p = alike_in_all_runs(t, at, p)
+        at, p = pooled_over_runs(t, at, p)
         at, intervals = profiled(t, at, p)
         accepted[k] = replace(p, intervals={**p.intervals, **intervals})
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
 
 
-def foretold_by_others(best: Shortlist) -> bool:
+def better_with_one_value(best: Shortlist) -> bool:
     """Whether the first has values of each run, and one with one value foretells unseen runs better."""
     first, *others = best.scored
     of_runs = [
@@ -167,7 +167,7 @@ def foretold_by_others(best: Shortlist) -> bool:
     )
 
 
-def alike_in_all_runs(
+def pooled_over_runs(
     t: TrainingSet, at: RefinedModel, p: AcceptedEffect
 ) -> tuple[RefinedModel, AcceptedEffect]:
     """An effect with one value for all runs, if values of each are no better, by the charge of each.

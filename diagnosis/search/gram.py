@@ -59,7 +59,7 @@ class Entry(NamedTuple):
         precision: (p, p), their prior precision.
         offset: (q,), offset of the nuisance parameters that belongs to what is given.
         nonlinear: number of parameters that are given, not fitted.
-        quieted: fall of the loss by the noise alone, see :func:`.candidates.quieted`.
+        removed_noise: fall of the loss by the noise alone, see :func:`.candidates.removed_noise`.
     """
 
     given: int
@@ -68,7 +68,7 @@ class Entry(NamedTuple):
     precision: np.ndarray
     offset: np.ndarray
     nonlinear: int
-    quieted: float
+    removed_noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ def gram_table(
         precision = np.zeros((start.size, start.size)) if s.precision is None else s.precision
         offset = nuisance.offset if s.nuisance_offset is None else s.nuisance_offset
         nonlinear = len(set(s.given) - set(s.fitted))
-        noise = 0.0 if s.quieted is None else float(np.sum(s.quieted / sigma**2) / OVERLAP)
+        noise = 0.0 if s.removed_noise is None else float(np.sum(s.removed_noise / sigma**2) / OVERLAP)
         columns_of = added(s.columns, s.unit)
         return Entry(given, columns_of, start, precision, offset, nonlinear, max(noise, 0.0))
 

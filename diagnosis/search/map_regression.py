@@ -153,7 +153,7 @@ def score(t: GramTable, candidate: int, shapes: int) -> Scored:
     options = [regression(t, candidate, k) for k in range(shapes)]
     charges = np.array(
         [
-            o.size(t.total) * t.per_parameter + e.quieted
+            o.size(t.total) * t.per_parameter + e.removed_noise
             for o, e in zip(options, t.entries[candidate], strict=False)
         ]
     )

@@ -20,7 +20,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import OVERLAP
 from ..runs.run_constants import NEGLIGIBLE, STEPS
-from .candidates import SMALL, CandidateShape, changed_error, model_error, quieted
+from .candidates import SMALL, CandidateShape, changed_error, model_error, removed_noise
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
@@ -349,7 +349,7 @@ def as_shape(
     given = r.own(at)
     offset = r.estimate.theta(at.fitted)
     unit = np.array([at.start.unit(n) for n in start.fitted])
-    noise = quieted(t.data, at.model(t.prior), r.estimate.model(t.prior))
+    noise = removed_noise(t.data, at.model(t.prior), r.estimate.model(t.prior))
     return CandidateShape(
         given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision, noise
     )

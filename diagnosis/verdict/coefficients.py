@@ -199,7 +199,7 @@ def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:
     return bool(effects) and all(f.id in without_gain and may_be_none(f) for f in effects)
 
 
-def spoils(found: Findings, data: ValidationData) -> bool:
+def worsens_training_runs(found: Findings, data: ValidationData) -> bool:
     """Whether effects predict any run that they were fitted to worse than the initial model does.
 
     What fails at times of one run is judged by no other, and may be paid for with coefficients of all.

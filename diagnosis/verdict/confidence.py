@@ -19,7 +19,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import MEASURED
 from ..runs.cleaning import Z95
 from ..runs.run_constants import DIGITS, EVERY
-from ..search.effect_evidence import EffectEvidence, beside_unknown
+from ..search.effect_evidence import EffectEvidence, with_unknown_cause
 from ..search.findings import Finding
 from ..search.refinement import at_limit
 
@@ -45,10 +45,10 @@ ON_ONE_LINE = "with another finding it makes up a force of another shape on the 
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
-OUSTED = "without the findings that are not sure, another effect explains as much"
+DEPENDS_ON_UNSURE = "without the findings that are not sure, another effect explains as much"
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 IMPLAUSIBLE = "other coefficients are beyond their priors in the model with it"
-MENDED = "it and a far smaller effect on the same axes make up a force of another shape as well"
+SHAPE_CORRECTED = "it and a far smaller effect on the same axes make up a force of another shape as well"
 OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
 LESS_THAN_POSSIBLE = "what explains more of the error, in the model with it, is not sure"
 DIFFERING = "fitted to accelerations it has another value than fitted to predictions"
@@ -68,14 +68,15 @@ class Doubts(NamedTuple):
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
         without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
-        unsettled: ids of the effects that took the place of another beside findings that are not sure.
+        depends_on_unsure: ids of the effects that took the place of another next to findings that are
+            not sure.
         implausible: whether nominal coefficients are beyond their priors.
-        mended: findings of which one explains far less than the other on the same axes, by their ids ->
-            square of the force of the smaller one, as a share of that of the finding.
+        shape_corrected: findings of which one explains far less than the other on the same axes, by
+            their ids -> square of the force of the smaller one, as a share of that of the finding.
         of_several: ids of the changes of one actuator that another one shares.
         differing: ids of the effects whose values by the two fits differ by more than their intervals;
             those of a model of the right shape agree (Hausman 1978).
-        beside_possibility: findings that explain little beside a possibility with more, by their ids ->
+        next_to_possibility: findings that explain little beside a possibility with more, by their ids ->
             the probability of that possibility, without which they are none.
         more_than_waves: waves, by their ids -> mean square of the residual that they do not account for,
             as a share of that of their force.
@@ -89,12 +90,12 @@ class Doubts(NamedTuple):
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
     without_gain: Collection[str] = ()
-    unsettled: Collection[str] = ()
+    depends_on_unsure: Collection[str] = ()
     implausible: bool = False
-    mended: Mapping[str, float] = MappingProxyType({})
+    shape_corrected: Mapping[str, float] = MappingProxyType({})
     of_several: Collection[str] = ()
     differing: Collection[str] = ()
-    beside_possibility: Mapping[str, float] = MappingProxyType({})
+    next_to_possibility: Mapping[str, float] = MappingProxyType({})
     more_than_waves: Mapping[str, float] = MappingProxyType({})
 
 
@@ -152,27 +153,27 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         ON_ONE_LINE: f.id in doubts.on_one_line,
         IMPLAUSIBLE: doubts.implausible,
         OF_SEVERAL: f.id in doubts.of_several,
-        LESS_THAN_POSSIBLE: f.id in doubts.beside_possibility,
+        LESS_THAN_POSSIBLE: f.id in doubts.next_to_possibility,
         DIFFERING: f.id in doubts.differing,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
-        OUSTED: f.id in doubts.unsettled,
+        DEPENDS_ON_UNSURE: f.id in doubts.depends_on_unsure,
         NO_GAIN: f.id in doubts.without_gain,
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
     caps[NEAR_NONE] = most_by_intervals(f, start)
     if f.evidence is not None and f.modulation:
         caps[MODULATED.format(f.modulation)] = f.evidence.listed
-    if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
+    if f.id in doubts.shape_corrected:  # what the smaller one explains is a residual of the larger
         nearest = 0.0 if f.evidence is None else f.evidence.nearest
-        caps[MENDED] = beside_unknown(doubts.mended[f.id], nearest)
+        caps[SHAPE_CORRECTED] = with_unknown_cause(doubts.shape_corrected[f.id], nearest)
     if f.id in doubts.more_than_waves:  # no candidate is like waves
-        caps[RESIDUAL] = beside_unknown(doubts.more_than_waves[f.id], 1.0)
+        caps[RESIDUAL] = with_unknown_cause(doubts.more_than_waves[f.id], 1.0)
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
         e = f.evidence
-        caps[RESIDUAL] = EVEN_ODDS if e is None else beside_unknown(e.remains**2, e.nearest)
-    most, rest = min(caps.values()), doubts.beside_possibility.get(f.id, 1.0)
+        caps[RESIDUAL] = EVEN_ODDS if e is None else with_unknown_cause(e.remains**2, e.nearest)
+    most, rest = min(caps.values()), doubts.next_to_possibility.get(f.id, 1.0)
     doubt = min(caps, key=caps.__getitem__) if own > most or of_set > most else ""
     return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)
 

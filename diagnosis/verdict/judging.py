@@ -32,11 +32,18 @@ from .coefficients import (
     better_calibration,
     concluded,
     needless,
-    spoils,
+    worsens_training_runs,
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .effects_like_coefficients import in_place_of_coefficients
-from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_one_line, squares
+from .law_in_parts import (
+    in_parts,
+    next_to_possibility,
+    of_several,
+    on_one_line,
+    shape_corrected,
+    squares,
+)
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
@@ -257,7 +264,7 @@ def _coefficients_alone(
     if not found.effects:
         return None
     idle = needless(found, unshown) and not predicts_worse(*data.losses(data.start, end.predicting))
-    if not idle and (any(map(is_finding, learned.effects)) or not spoils(found, data)):
+    if not idle and (any(map(is_finding, learned.effects)) or not worsens_training_runs(found, data)):
         return None
     nothing = replace(found, effects=[], model=data.start, suspects=[], moved={})
     fit = to_predictions(nothing, data.train, calibrations.prior, False)
@@ -293,8 +300,10 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
     doubts = doubts._replace(
-        mended=mended(found, start, falls_by_axis(found, start, train), squares(found, train), each),
-        beside_possibility=beside_possibility(found, explained, each),
+        shape_corrected=shape_corrected(
+            found, start, falls_by_axis(found, start, train), squares(found, train), each
+        ),
+        next_to_possibility=next_to_possibility(found, explained, each),
     )
     return DecidedFindings(
         learned=with_confidence(found, start, doubts),
@@ -361,16 +370,19 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
         rivals={i for f, c in zip(found.effects, alone, strict=True) if c.own < FOUND for i in f.alike},
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
-    doubts = doubts._replace(unsettled=unsettled(found, each))
+    doubts = doubts._replace(depends_on_unsure=depends_on_unsure(found, each))
     effects = []
     for f in found.effects:
         c = confidence_of(f, start, doubts)
-        alike = [*f.alike, *(i for i in f.instead_of if f.id in doubts.unsettled and i not in f.alike)]
+        alike = [
+            *f.alike,
+            *(i for i in f.instead_of if f.id in doubts.depends_on_unsure and i not in f.alike),
+        ]
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt, alike=alike))
     return replace(found, effects=effects)
 
 
-def unsettled(found: Findings, each: Sequence[Confidence]) -> set[str]:
+def depends_on_unsure(found: Findings, each: Sequence[Confidence]) -> set[str]:
     """The effects that took the place of another beside findings that are not sure, or not left."""
     sure = {f.id for f, c in zip(found.effects, each, strict=True) if c.own >= FOUND}
     return {f.id for f in found.effects if f.instead_of and not sure.issuperset(f.beside)}

@@ -44,7 +44,7 @@ def _family(law: Effect) -> tuple[str, str]:
     return law.axis, law.wording.family.name
 
 
-def mended(
+def shape_corrected(
     found: Findings, start: Model, falls: np.ndarray, squares: np.ndarray, alone: Sequence[Confidence]
 ) -> dict[str, float]:
     """The findings on one axis of which one explains next to nothing there, and the other more.
@@ -54,7 +54,7 @@ def mended(
     What is so near zero that of all candidates one is by chance mends nothing, nor does a possibility
     that is a change of coefficients within their stated deviations: these are likelier, and no cause.
     A small effect on the measurement is in doubt, and says nothing of a force; a large one hides forces
-    that are smaller, and may be mended by another on the measurement.
+    that are smaller, and may be corrected by another on the measurement.
 
     Args:
         found: the findings.
@@ -110,7 +110,7 @@ def _as_stated(f: Finding, model: Model, start: Model) -> bool:
     return all(is_allowed(name, x) for name, x in added)
 
 
-def beside_possibility(
+def next_to_possibility(
     found: Findings, explained: Sequence[float], alone: Sequence[Confidence]
 ) -> dict[str, float]:
     """The findings that explain next to nothing, and less than a mere possibility, by their ids.

@@ -12,7 +12,7 @@ from diagnosis.predictors.parameter_set import read_model, write_model
 from diagnosis.predictors.ship_model import of_run, parameter_and_run
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.search.candidates import candidate, changed_error, model_error
-from diagnosis.search.forward_selection import ForwardSelection, foretold_by_others
+from diagnosis.search.forward_selection import ForwardSelection, better_with_one_value
 from diagnosis.search.map_regression import Scored
 from diagnosis.search.shortlist import of_one_value
 
@@ -141,4 +141,4 @@ def test_values_of_each_run_stand_back_where_one_value_foretells_unseen_runs(
         starts=[SimpleNamespace(values={second: 1.0}), SimpleNamespace(values={first: 1.0})],
         scored=scored,
     )
-    assert foretold_by_others(best) is stands_back
+    assert better_with_one_value(best) is stands_back
