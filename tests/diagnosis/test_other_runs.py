@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from support.planted import voyages
 
 from diagnosis import Model
 from diagnosis.predictors.parameter_set import read_model, write_model
 from diagnosis.predictors.ship_model import of_run
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.other_runs import shrunk_mean, with_other_runs
+from diagnosis.session import begin
 
 FOULED = {of_run("delta_X_absu_u", f"run{k}"): x for k, x in enumerate((-2.0, -3.0, -4.0))}
 CURRENTS = {of_run("V_n", f"run{k}"): x for k, x in enumerate((0.1, 0.1, 0.2))}
@@ -100,3 +102,22 @@ def test_the_file_has_the_mean_for_any_run_and_times_of_the_first(tmp_path):
     )
     assert "bow_outage_start_1" in text
     assert "V_n" not in text
+
+
+@pytest.mark.slow
+def test_a_test_run_is_predicted_with_the_mean_of_the_runs_before():
+    """Fouling that differs from run to run: the runs keep their own values, the other one has the mean."""
+    fouling = (-3.0, -9.0, -6.0)  # N s2/m2
+    every = [voyages(k + 1, 60.0, ship={"delta_X_absu_u": x})[k] for k, x in enumerate(fouling)]
+    d = begin(every[:2], every[2:], 0.02).diagnose()
+    assert [f.id for f in d.learned.effects] == ["X_|u|u"]
+    model = d.learned.model
+    for run, x in zip(("run0", "run1"), fouling, strict=False):
+        assert model.during(run).value("delta_X_absu_u") == pytest.approx(x, abs=0.8)
+    own = [model.during(run).value("delta_X_absu_u") for run in ("run0", "run1")]
+    assert model.value("delta_X_absu_u") == pytest.approx(shrunk_mean(np.array(own)))
+    name = "vessel.delta_X_absu_u"
+    k = d.posterior.names.index(name)
+    assert np.sqrt(d.posterior.covariance[k, k]) > 2.0
+    test = d.comparison.evaluations[-1]
+    assert test.after.position < 0.6 * test.before.position
