@@ -1094,6 +1094,35 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
         assert seen.own == pytest.approx(odds if doubted.get(made[0].id) == 0.1 else 0.99, abs=0.002)
 
 
+@pytest.mark.parametrize(
+    ("effect", "at_rest", "confidence"),
+    [
+        ("curve_X(u)", (0.007, 0.0005), 0.5),
+        ("curve_X(u)", (-0.007, 0.0005), 0.5),
+        ("curve_X(u)", (0.001, 0.0005), 0.99),  # two standard deviations
+        ("curve_vsp_x(c)", (0.007, 0.0005), 0.99),  # an actuator may have a force at no command
+    ],
+)
+def test_a_curve_of_the_hull_with_a_force_at_rest_may_be_a_constant_force_and_a_drag(
+    effect, at_rest, confidence
+):
+    """With |u|u and a small constant force hidden, a curve over the surge speed had 0.99."""
+    e = Model().ship.effects[effect]
+    value, std = at_rest
+    # A curve that is not zero but in its middle, and is known everywhere.
+    values = {p.name: 0.05 for p in e.parameters if p.name not in e.settings}
+    ci95 = {n: (0.04, 0.06) for n in values}
+    middle = [*values][len(values) // 2]
+    values[middle], ci95[middle] = value, (value - Z95 * std, value + Z95 * std)
+    made = Finding(effect, values, ci95, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = confidence_of(made, Model())
+    assert seen.own == confidence
+    assert ("zero speed" in seen.doubt) == (confidence < 0.99)
+    # Nodes without data are no part of a finding.
+    del values[middle], ci95[middle]
+    assert confidence_of(replace(made, values=values, ci95=ci95), Model()).own == 0.99
+
+
 @pytest.mark.parametrize("listed", [0.02, 0.6, 0.999])
 def test_an_effect_is_no_surer_than_beside_a_modulated_force_which_is_named(listed):
     """A bow thruster lost force with the shaft speed: a curve over its command had 0.976."""

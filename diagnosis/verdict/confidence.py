@@ -18,7 +18,7 @@ from scipy.special import expit
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import MEASURED
 from ..runs.cleaning import Z95
-from ..runs.run_constants import DIGITS, EVERY
+from ..runs.run_constants import DIGITS, EVERY, FAR_OFF
 from ..search.effect_evidence import EffectEvidence, with_unknown_cause
 from ..search.findings import Finding
 from ..search.refinement import at_limit
@@ -34,6 +34,7 @@ FOUND = 0.8  # 1, confidence from which on an effect is found; contract
 EVEN_ODDS = 0.5
 MAY_BE_NONE = "the intervals of all its values include zero"
 NEAR_NONE = "its values are known so badly that of all candidates one may be as far from zero by chance"
+AT_REST = "it has a force at zero speed, as a constant force next to a drag has"
 MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
 MAY_BE_MISREAD = (
@@ -146,6 +147,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     # Each shows an alternative that is as likely as the effect or its set.
     all_doubts = {
         MAY_BE_NONE: may_be_none(f),
+        AT_REST: acts_at_rest(f, start),
         MAY_BE_LAGS: _may_be_lags(f, start),
         doubts.of_data: bool(doubts.of_data),
         RIVAL: f.id in doubts.rivals,
@@ -215,6 +217,17 @@ def may_be_none(f: Finding) -> bool:
     return bool(f.values) and all(
         name in f.ci95 and f.ci95[name][0] <= 0.0 <= f.ci95[name][1] for name in f.values
     )
+
+
+def acts_at_rest(f: Finding, start: Model) -> bool:
+    """Whether a free curve of the hull's force is not zero at zero speed, which is its middle node."""
+    effect = start.ship.effects[f.id]
+    if effect.kind != "force" or not effect.search.smooth:
+        return False
+    nodes = [n for n in effect.coefficients if n not in effect.settings]
+    middle = nodes[len(nodes) // 2]
+    low, high = f.ci95.get(middle, (0.0, 0.0))
+    return abs(f.values.get(middle, 0.0)) > FAR_OFF * (high - low) / (2.0 * Z95)
 
 
 def _may_be_lags(f: Finding, start: Model) -> bool:
