@@ -1111,7 +1111,7 @@ def test_a_curve_of_the_hull_with_a_force_at_rest_may_be_a_constant_force_and_a_
     value, std = at_rest
     # A curve that is not zero but in its middle, and is known everywhere.
     values = {p.name: 0.05 for p in e.parameters if p.name not in e.settings}
-    ci95 = {n: (0.04, 0.06) for n in values}
+    ci95 = dict.fromkeys(values, (0.04, 0.06))
     middle = [*values][len(values) // 2]
     values[middle], ci95[middle] = value, (value - Z95 * std, value + Z95 * std)
     made = Finding(effect, values, ci95, 0.99, [], 0.9, 0.9, together=0.99)
