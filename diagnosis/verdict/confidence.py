@@ -205,11 +205,16 @@ def most_by_intervals(f: Finding, start: Model) -> float:
     zero, whatever is known of them before (Edwards, Lindman and Savage, Psychol. Rev. 70, 1963).
     Before the data it is even odds that an effect is missing, which all candidates share.
     """
-    squares = [(low + high) ** 2 / (high - low) ** 2 for low, high in f.ci95.values() if high > low]
+    squares = [from_zero(low, high) ** 2 for low, high in f.ci95.values() if high > low]
     if not squares or len(squares) < len(f.values):
         return 1.0
-    evidence = 0.5 * Z95**2 * sum(squares)
+    evidence = 0.5 * sum(squares)
     return max(EVEN_ODDS, float(expit(evidence - np.log(len(start.ship.candidates)))))
+
+
+def from_zero(low: float, high: float) -> float:
+    """Standard deviations by which a value is from zero, by the ends of its 95 % interval."""
+    return Z95 * abs(low + high) / (high - low) if high > low else np.inf
 
 
 def may_be_none(f: Finding) -> bool:
@@ -224,10 +229,9 @@ def acts_at_rest(f: Finding, start: Model) -> bool:
     effect = start.ship.effects[f.id]
     if effect.kind != "force" or not effect.search.smooth:
         return False
-    nodes = [n for n in effect.coefficients if n not in effect.settings]
-    middle = nodes[len(nodes) // 2]
-    low, high = f.ci95.get(middle, (0.0, 0.0))
-    return abs(f.values.get(middle, 0.0)) > FAR_OFF * (high - low) / (2.0 * Z95)
+    nodes = effect.coefficients
+    interval = f.ci95.get(nodes[len(nodes) // 2])
+    return interval is not None and from_zero(*interval) > FAR_OFF
 
 
 def _may_be_lags(f: Finding, start: Model) -> bool:
