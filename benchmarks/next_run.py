@@ -239,6 +239,11 @@ def chosen(d: Designer, k: Knowledge, kind: str, seed: int) -> Iterator[tuple[st
         yield kind, d.search(k, seed)
 
 
+def best(d: Designer, k: Knowledge, found: ScoredPlan) -> list[ScoredPlan]:
+    """A plan, and those that take its place where it leaves the basin."""
+    return d.best(found, (d.usual(k, name) for name in d.usual_runs))
+
+
 @dataclass(frozen=True, eq=False)
 class FurtherRuns:
     """The runs of a cell that the first one leaves open.
@@ -270,7 +275,7 @@ class FurtherRuns:
         for name, plan in found:
             try:
                 # A usual or random run is the one that is named, or none.
-                plans = [plan] if kind in ("usual", "random") else d.best(k, plan)
+                plans = [plan] if kind in ("usual", "random") else best(d, k, plan)
                 run, _ = d.checked(k, plans, self.cell.seed)
                 sure = Rehearsal(q.data, d.space, k).sure([d.windows(run.motion)], self.cell.seed)
                 data = [*q.data, self._measured(d, run, f"{name}_{len(q.data)}", len(q.data))]
@@ -332,7 +337,7 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
                 data = first_runs(cell, Path(scratch), Path(scratch) / "truth.ssv")
                 q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
                 d, k = prepared(q)
-                plans = d.best(k, d.search(k, seed, points=BRIEF, evolved=0))
+                plans = best(d, k, d.search(k, seed, points=BRIEF, evolved=0))
                 run, spread = d.checked(k, plans, seed)
                 fresh = d.spread(k, run, seed + 1)
             except InputError as error:

@@ -134,10 +134,13 @@ def test_the_first_plan_whose_spread_keeps_the_basin_is_taken():
     plans[2] = replace(plans[2], excess=0.1)
     d.tried = plans[::-1]
     of_names = {"eight": 0.1, "circle": 0.2, "zig-zag": 0.3}
-    d.__dict__["usual"] = lambda k, name: replace(by_first(plan), score=of_names.get(name, 0.0))
-    best = d.best(None, plans[0])
+    usual = [replace(by_first(plan), score=score) for score in of_names.values()]
+    best = d.best(plans[0], usual)
     assert [s.score for s in best[: designing.REFINED]] == [0.9, 0.8, 0.6]
     assert [s.score for s in best[designing.REFINED :]][:3] == [0.3, 0.2, 0.1]
+    d.tried += usual  # they were scored, and are no better than others then
+    assert d.best(plans[0], usual) == best
+    assert d.best(plans[0], plans[:2]) == best[:3], "none is checked twice"
 
     asked, kept = [], set()
 

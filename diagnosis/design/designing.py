@@ -287,15 +287,14 @@ class Designer:
         self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 
-    def best(self, k: Knowledge, found: ScoredPlan) -> list[ScoredPlan]:
+    def best(self, found: ScoredPlan, usual: Iterable[ScoredPlan]) -> list[ScoredPlan]:
         """A plan, the best of the others that were tried, then usual runs, all within the limits."""
 
         def in_order(plans: Iterable[ScoredPlan]) -> list[ScoredPlan]:
             return sorted((s for s in plans if s.excess == 0.0), key=lambda s: -s.score)
 
         others = in_order(s for s in self.tried if s is not found)
-        usual = in_order(self.usual(k, name) for name in self.usual_runs)
-        return [found, *others[: REFINED - 1], *usual]
+        return [*dict.fromkeys([found, *others[: REFINED - 1], *in_order(usual)])]
 
     def checked(self, k: Knowledge, plans: Iterable[ScoredPlan], seed: int) -> tuple[ScoredPlan, Spread]:
         """The first of some plans that keeps the basin with its spread, and this spread.

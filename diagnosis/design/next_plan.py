@@ -87,7 +87,7 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
         usual = {name: designer.usual(now, name) for name in designer.usual_runs}
         if n == 0:
             pairs = designer.inseparable(k)
-        run, tracks = designer.checked(now, designer.best(now, found), seed + n)
+        run, tracks = designer.checked(now, designer.best(found, usual.values()), seed + n)
         advance("simulated outcomes of the plan and of usual runs")
         others = {name: (sure(s), s) for name, s in usual.items() if s.excess == 0.0}
         planned.append(PlannedRun(designer, run, now, tracks, sure(run), others))

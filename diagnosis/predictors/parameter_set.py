@@ -60,7 +60,7 @@ def write_model(path: str | Path, model: Model) -> None:
         for run, own in model.runs.items()
     }
     for part, own in next(iter(runs.values()), {}).items():
-        times = {name: told for name, told in own.items() if name in model.ship.effects.timed}
+        times = {name: x for name, x in own.items() if name in model.ship.effects.timed}
         values[part] = {**times, **values[part]}
     beside = values.pop(MEASUREMENT)
     of_runs = (own for parts in runs.values() for own in parts.values())
