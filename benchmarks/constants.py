@@ -2,7 +2,8 @@
 
 Numbers are counted in the syntax tree, wherever they are, so that moving one is no removal: constants
 of modules, fields of settings, defaults of arguments, literals within functions, data files. An index
-does not count, nor does what follows from named constants alone.
+does not count, nor does what follows from named constants alone. A field that is 0 or 1 by default is
+without effect unless somebody sets it, as an argument is, and does not count either.
 """
 
 import argparse
@@ -100,6 +101,12 @@ def is_derived(node: ast.AST) -> bool:
     return named and all(small(n) for n in parts if is_number(n))
 
 
+def is_neutral(value: ast.AST) -> bool:
+    """Whether a field's default is 0 or 1, without effect; also in a ``Field(...)``."""
+    numbers = [n for n in ast.walk(value) if is_number(n)]
+    return not isinstance(value, ast.Tuple) and all(n.value in (0, 1) for n in numbers)
+
+
 class Reader(ast.NodeVisitor):
     """Finds the constants of one module.
 
@@ -124,7 +131,7 @@ class Reader(ast.NodeVisitor):
         self.visit(tree)
 
     def _add(self, node: ast.AST, name: str, value: ast.AST, reason: str = "", kind: str = "") -> None:
-        if count := size(value):
+        if count := 0 if (kind or self._kind) == "field" and is_neutral(value) else size(value):
             line = getattr(node, "lineno", 0)
             self.found.append(
                 Constant(self._file, line, kind or self._kind, name, count, ast.unparse(value), reason)

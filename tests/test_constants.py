@@ -55,6 +55,11 @@ SEARCH = Search(chance=0.01, width=3.0, every=0.5)
         ("@rule(0.3)\ndef f(): ...", {"module": 1}),
         ("class A:\n    b: float = 0.5\n    c: int\n    d = 3, 4", {"field": 3}),
         ("class A:\n    def f(self, a=0.5, *, b=3.0): return 5.0 * a", {"default": 2, "literal": 1}),
+        (
+            "class A:\n    b: float = 0.0\n    c: float = 1\n    d: int = Field(0, ge=0)\n    e: int = 2",
+            {"field": 1},
+        ),
+        ("class A:\n    b: float = Field(0.0, le=5.0)\n    c = 0, 1", {"field": 4}),
         (SETTINGS, {"field": 3}),
         ("def f(a, b=0, c=-1.0, d=None): ...", {}),
         ("def f(a):\n    return a[3] + 2 * a[-1] - 1.0 + 0.5 * a ** 2", {"literal": 1}),

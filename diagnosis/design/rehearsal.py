@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..assessment.covariates import AXES
 from ..assessment.residual.remainder import remaining
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import omega_std
@@ -37,7 +38,7 @@ UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the
 
 
 # 1, noise on each axis of overlapping windows where that of one that counts is 1
-NOISE = np.full(3, OVERLAP**-0.5)
+NOISE = np.repeat(1.0 / np.sqrt(OVERLAP), len(AXES))
 
 
 class RowsOfRuns(NamedTuple):

@@ -9,6 +9,7 @@ relative error of y is tan(latitude) times the distance to north over the earth'
 
 import re
 from collections.abc import Mapping, Sequence
+from math import tau
 
 import numpy as np
 import pandas as pd
@@ -18,14 +19,14 @@ from cosim import InputError
 from ..run_constants import NEGLIGIBLE
 from .columns import Column
 from .name_words import words_of
-from .unit_check import UNITS
+from .unit_check import TURN, UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 NOT_AVAILABLE = {"x": 91.0, "y": 181.0}  # degrees
-TURNS = 360.0, 360.0 / WHOLE, 2.0 * np.pi  # in degrees, 1e-7 degrees, rad
+TURNS = TURN, TURN / WHOLE, tau  # in degrees, 1e-7 degrees, rad
 # An angle as a text: 63.44° N, N63.44, 63°26.4'N, 63 26 24.0 N; 63.44°.
 ANGLE = re.compile(
     r"(?P<before>[NSEW])?\s*(?P<deg>[+-]?\d+(?:\.\d+)?)(?:\s*[°º]\s*|\s+|(?=[NSEW])|$)"
