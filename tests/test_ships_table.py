@@ -135,12 +135,65 @@ def test_method_predicts_a_linear_ship(name, package, setting):
     assert np.divide(errors, steady_error()).max() < (0.6 if name == "neural" else 0.1)
 
 
+def pysindy():
+    return pytest.importorskip("pysindy", reason="not in the extra dev: pysindy")
+
+
+def theirs(library):
+    """The package's own library of functions."""
+    degree, drag = {"linear": (1, False), "drag": (2, True), "cubic": (3, False)}[library]
+    polynomials = pysindy().PolynomialLibrary(degree=degree)
+    if not drag:
+        return polynomials
+    squares = pysindy().CustomLibrary([lambda x: np.abs(x) * x], [lambda x: f"|{x}|{x}"])
+    return pysindy().ConcatLibrary([polynomials, squares])
+
+
 @pytest.mark.parametrize("library", ["linear", "drag", "cubic"])
 def test_columns_are_those_of_the_library(library):
     sindy = pytest.importorskip("benchmarks.ships.entries.sindy")
     x = np.random.default_rng(1).normal(size=(20, 5))
-    theirs = sindy.functions(library).fit(x).transform(x)
-    assert sindy.columns(library, x) == pytest.approx(np.asarray(theirs))
+    assert sindy.columns(library, x) == pytest.approx(np.asarray(theirs(library).fit(x).transform(x)))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("terms", [1, 3, 7])
+def test_forward_regression_that_runs_once_finds_what_the_package_finds(terms):
+    selection = pytest.importorskip("sysidentpy.model_structure_selection", reason="no sysidentpy")
+    narx = import_module("benchmarks.ships.entries.narx")
+    draw = np.random.default_rng(4)
+    psi = draw.normal(size=(300, 9))
+    y = psi[:, [2, 5, 7]] @ np.array([[1.0], [0.3], [-2.0]]) + 0.1 * draw.normal(size=(300, 1))
+    once, usual = narx.OfParts(), selection.FROLS()
+    once.max_lag = usual.max_lag = 1
+    once.broken = np.zeros(301, dtype=bool)
+    once.run_mss_algorithm(psi, np.vstack([y[:1], y]), 9)
+    _, found, chosen, _ = once.run_mss_algorithm(psi, np.vstack([y[:1], y]), terms)
+    _, expected, columns = usual.run_mss_algorithm(psi, np.vstack([y[:1], y]), terms)
+    assert found.tolist() == expected.tolist()
+    assert np.array_equal(chosen, columns)
+
+
+@pytest.mark.parametrize("derivative", ["own", "smoothed differences"])
+@pytest.mark.parametrize("threshold", [0.0, 0.02])
+def test_sparse_law_is_that_of_the_package(threshold, derivative):
+    sindy = pytest.importorskip("benchmarks.ships.entries.sindy")
+    runs = [toy(1), toy(2)]
+    law = sindy.law(runs, Ignorant(), "commands", 0.0, "drag", threshold, derivative)
+    parts = [(t, p) for t in (table(r, sindy.STEP) for r in runs) for p in t.parts]
+    model = pysindy().SINDy(
+        optimizer=pysindy().STLSQ(threshold=threshold),
+        feature_library=theirs("drag"),
+        differentiation_method=pysindy().SmoothedFiniteDifference(),
+    )
+    model.fit(
+        [t.nu[p] for t, p in parts],
+        t=sindy.STEP,
+        x_dot=[t.nu_dot[p] for t, p in parts] if derivative == "own" else None,
+        u=[t.given[p] for t, p in parts],
+    )
+    nu, given = parts[0][0].nu[parts[0][1]], parts[0][0].given[parts[0][1]]
+    assert law.acceleration(nu, given) == pytest.approx(model.predict(nu, u=given), rel=1e-6, abs=1e-9)
 
 
 def training(*seeds):

@@ -27,14 +27,23 @@ TERMS = 20  # most that the information criterion chooses from
 
 
 class OfParts(FROLS):
-    """Leaves out rows whose lags reach into another stretch; ``broken`` (rows,) says which."""
+    """Forward regression without the rows whose lags reach into another stretch, run once for all sizes.
+
+    ``broken`` (rows,) says which rows these are. Forward regression adds one term after another, so that
+    a model of fewer terms begins the one of ``TERMS``; the package begins anew for each size.
+    """
 
     broken: np.ndarray
+    _found: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def run_mss_algorithm(self, psi: Any, y: Any, process_term_number: int) -> Any:
-        kept = ~self.broken[self.max_lag :]
-        y = np.concatenate([y[: self.max_lag], y[self.max_lag :][kept]])
-        return *super().run_mss_algorithm(psi[kept], y, process_term_number), y[self.max_lag :]
+        if self._found is None:
+            kept = ~self.broken[self.max_lag :]
+            y = np.concatenate([y[: self.max_lag], y[self.max_lag :][kept]])
+            most = min(TERMS, psi.shape[1])
+            self._found = *super().run_mss_algorithm(psi[kept], y, most), y[self.max_lag :]
+        err, terms, chosen, target = self._found
+        return err, terms[:process_term_number], chosen[:, :process_term_number], target
 
 
 @dataclass(frozen=True)

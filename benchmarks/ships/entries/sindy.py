@@ -25,16 +25,6 @@ SETTINGS = {
 LIBRARIES = {"linear": (1, False), "drag": (2, True), "cubic": (3, False)}
 
 
-def functions(library: str) -> pysindy.feature_library.base.BaseFeatureLibrary:
-    """A library of PySINDy."""
-    degree, drag = LIBRARIES[library]
-    polynomials = pysindy.PolynomialLibrary(degree=degree)
-    if not drag:
-        return polynomials
-    squares = pysindy.CustomLibrary([lambda x: np.abs(x) * x], [lambda x: f"|{x}|{x}"])
-    return pysindy.ConcatLibrary([polynomials, squares])
-
-
 @cache
 def _factors(variables: int, degree: int) -> np.ndarray:
     """(degree, terms): numbers of the factors of each term from one on, 0 where it has fewer."""
@@ -47,7 +37,7 @@ def _factors(variables: int, degree: int) -> np.ndarray:
 
 
 def columns(library: str, x: np.ndarray) -> np.ndarray:
-    """What that library makes of rows x, in the same order and in less time."""
+    """Functions of rows x, the same and in the same order as of PySINDy's libraries, in less time."""
     degree, drag = LIBRARIES[library]
     one = np.column_stack([np.ones(len(x)), x])
     polynomials = one[:, _factors(x.shape[1], degree)].prod(axis=1)
@@ -75,20 +65,15 @@ def law(
         derivative: the smoother's accelerations, or smoothed differences of the velocities.
     """
     tables = [table(r, STEP, delay) for r in runs]
-    parts = [(t, p) for t in tables for p in t.parts]
-    own = derivative == "own"
-    model = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=threshold),
-        feature_library=functions(library),
-        differentiation_method=pysindy.SmoothedFiniteDifference(),
-    )
-    model.fit(
-        [t.nu[p] for t, p in parts],
-        t=STEP,
-        x_dot=[t.nu_dot[p] for t, p in parts] if own else None,
-        u=[nominal.inputs(inputs, t.nu[p], t.given[p]) for t, p in parts],
-    )
-    factors = model.coefficients().T
+    parts = [(t.nu[p], t.nu_dot[p], t.given[p]) for t in tables for p in t.parts]
+    if derivative == "smoothed differences":  # of velocities smoothed once more, as in the package
+        d = pysindy.SmoothedFiniteDifference()
+        slopes = [(d(nu, t=STEP), d.smoothed_x_, given) for nu, _, given in parts]
+        parts = [(nu, slope, given) for slope, nu, given in slopes]
+    nu, nu_dot, given = map(np.vstack, zip(*parts, strict=True))
+    optimizer = pysindy.STLSQ(threshold=threshold)
+    optimizer.fit(columns(library, np.hstack([nu, nominal.inputs(inputs, nu, given)])), nu_dot)
+    factors = optimizer.coef_.T
 
     def acceleration(nu: np.ndarray, given: np.ndarray) -> np.ndarray:
         nu = np.clip(nu, -FASTEST, FASTEST)
