@@ -7,8 +7,8 @@ prior's standard deviation. It tells of all 95 % intervals how many hold the tru
 is off, and which share of the samples of windows of a held-out run lies within the bands, positions and
 headings alike.
 
-With ``--ship`` bands of the four published runs of CyberShip Enterprise 1 are told, too, each predicted
-with what ``learn`` finds in the three others; with ``--answers DIR`` those of the cells that
+With ``--ship`` bands of the four published runs of CyberShip Enterprise 1 are reported, too, each
+predicted with what ``learn`` finds in the three others; with ``--answers DIR`` those of the cells that
 ``benchmarks.hidden_effects`` has answered. Intervals of shares are binomial, of as many windows, as
 samples of one window miss together.
 """

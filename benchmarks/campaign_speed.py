@@ -171,8 +171,8 @@ def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
     print(f"{head}{'here, s':>9}{'first, s':>10}{'then/s':>9}")
     for name, each in taken.items():
         wall, used, here, first = (statistics.median(column) for column in zip(*each, strict=True))
-        told = f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}"
-        print(f"{told}{here:9.2f}{first:10.2f}{(options.runs - 1) / (wall - first):9.3f}")
+        stated = f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}"
+        print(f"{stated}{here:9.2f}{first:10.2f}{(options.runs - 1) / (wall - first):9.3f}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -192,8 +192,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"beside its steps a run takes {beside_steps(folder, native):.1f} ms of processor time")
         if options.short:
             found = memory(folder, native, options.short)
-            told = ", ".join(f"{m:.1f}" for m in found)
-            print(f"memory over {options.short} runs of 1 s [MiB]: {told}")
+            stated = ", ".join(f"{m:.1f}" for m in found)
+            print(f"memory over {options.short} runs of 1 s [MiB]: {stated}")
     return 0
 
 

@@ -143,9 +143,9 @@ class Reader(ast.NodeVisitor):
         while above in self._comments and self._lines[above - 1].lstrip().startswith("#"):
             above -= 1
         places = range(node.lineno, (node.end_lineno or node.lineno) + 1), range(above + 1, node.lineno)
-        told = [" ".join(self._comments[k] for k in lines if k in self._comments) for lines in places]
+        stated = [" ".join(self._comments[k] for k in lines if k in self._comments) for lines in places]
         return ". ".join(
-            text.rstrip(".") if text is told[0] and told[1] else text for text in told if text
+            text.rstrip(".") if text is stated[0] and stated[1] else text for text in stated if text
         )
 
     def _assignment(self, node: ast.Assign | ast.AnnAssign) -> None:
@@ -158,8 +158,8 @@ class Reader(ast.NodeVisitor):
         if isinstance(value, ast.Call) and ast.unparse(value.func) in self._documented:
             docs = self._documented[ast.unparse(value.func)]
             for given in value.keywords:  # an object of settings
-                told = docs.get(given.arg or "", reason)
-                self._add(given.value, f"{name}.{given.arg}", given.value, told, "field")
+                stated = docs.get(given.arg or "", reason)
+                self._add(given.value, f"{name}.{given.arg}", given.value, stated, "field")
             value = ast.Tuple(value.args, ast.Load())
         self._add(
             node, self._class + name, value, self._docs.get(name, "") or reason or description(value)
@@ -237,8 +237,8 @@ def attributes(docstring: str) -> dict[str, str]:
     """Name -> text of the entries under ``Attributes:`` of a class."""
     _, _, listed = docstring.partition("Attributes:\n")
     found = {}
-    for names, told in ENTRY.findall(listed):
-        found |= dict.fromkeys(names.split(", "), " ".join(told.split()))
+    for names, stated in ENTRY.findall(listed):
+        found |= dict.fromkeys(names.split(", "), " ".join(stated.split()))
     return found
 
 
@@ -327,10 +327,10 @@ def page(found: Sequence[Constant]) -> Iterator[str]:
             room = c.room
             yield f"\n## `{room}`\n\n| constant | value | unit | reason |\n|---|---|---|---|"
         unit = LEADING_UNIT.search(c.reason)
-        told = c.reason.replace(unit[0], "", 1).lstrip(" ;,.:") if unit else c.reason
+        stated = c.reason.replace(unit[0], "", 1).lstrip(" ;,.:") if unit else c.reason
         place = c.file.removeprefix(f"{room}/").removesuffix(".py").replace("/", ".")
         value = c.value if len(c.value) <= LONG else f"{c.value[:LONG]} ..."
-        cells = f"`{place}: {c.name}`", f"`{value}`", (unit[1] or unit[0]) if unit else "", told
+        cells = f"`{place}: {c.name}`", f"`{value}`", (unit[1] or unit[0]) if unit else "", stated
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

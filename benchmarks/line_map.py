@@ -54,8 +54,8 @@ def measure(copy: Path, target: Path, marks: str) -> None:
         sys.executable, "-m", "pytest", "-q", "--assert=plain", "-pno:cacheprovider", "-n", str(WORKERS),
         f"-p{__name__}", f"--junitxml={folder / 'junit.xml'}", "-m", marks,
     ]  # fmt: skip
-    told = {"COVERAGE_PROCESS_START": str(settings), "PYTHONPATH": str(copy), TEST: ""}
-    subprocess.run(tests, cwd=copy, env=os.environ | told, check=False)
+    stated = {"COVERAGE_PROCESS_START": str(settings), "PYTHONPATH": str(copy), TEST: ""}
+    subprocess.run(tests, cwd=copy, env=os.environ | stated, check=False)
     combine = [sys.executable, "-m", "coverage", "combine", "-q", f"--rcfile={settings}", str(folder)]
     subprocess.run(combine, cwd=copy, check=True)
     folder.rename(target)

@@ -103,11 +103,13 @@ class Judge:
                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
             ) as process:  # fmt: skip
                 try:
-                    told, _ = process.communicate(timeout=self.seconds)
+                    stated, _ = process.communicate(timeout=self.seconds)
                 except subprocess.TimeoutExpired:
                     os.killpg(process.pid, 9)
                     return Outcome(None, "")
-        fails = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", told, re.MULTILINE)  # ids have blanks
+        fails = re.findall(
+            r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", stated, re.MULTILINE
+        )  # ids have blanks
         return Outcome(process.returncode, fails[0] if fails else "")
 
 

@@ -40,8 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for scenario in options.scenarios:
         native, python = (log_of(scenario, options.steps, kind) for kind in (True, False))
         good &= native == python
-        told = "the same" if native == python else "DIFFER"
-        print(f"{scenario.stem:20} {native[0]}, {native[1]} rows: {told}", flush=True)
+        stated = "the same" if native == python else "DIFFER"
+        print(f"{scenario.stem:20} {native[0]}, {native[1]} rows: {stated}", flush=True)
     return 0 if good else 1
 
 

@@ -1,4 +1,4 @@
-"""Faults of sensors in simulated runs: are they named, and is none told of a clean run?
+"""Faults of sensors in simulated runs: are they named, and is none reported of a clean run?
 
 ``python -m benchmarks.sensor_faults [--seeds N] [--learn N]``. Runs of CyberShip Enterprise 1 in closed
 loop, with noise, freezes and spikes of the pose; velocity and yaw rate are measured too. Each fault
@@ -123,7 +123,7 @@ def voyages(seeds: int, vessel: dict[str, float]) -> Iterator[tuple[int, Run]]:
 
 
 def named(fault: Fault, findings: Sequence[SensorFinding]) -> bool:
-    """Whether a fault is told, with a size within a tenth or its interval."""
+    """Whether a fault is reported, with a size within a tenth or its interval."""
     for f in findings:
         if (f.channel, f.kind) != (fault.channel, fault.kind):
             continue

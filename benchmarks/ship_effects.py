@@ -162,7 +162,7 @@ def problem(ship: Ship, name: str, seed: int, exact: bool) -> dict[str, Any]:
     found = diagnosis.diagnose(
         smoothed[:2], smoothed[2:], prior=0.0 if exact else WRONG, model=model
     ).content
-    told = [e for e in found.effects if not cause.id or e.id != cause.id]
+    stated = [e for e in found.effects if not cause.id or e.id != cause.id]
     sets = {i for e in found.effects for i in (e.id, *e.indistinguishable)}
     said = found.verdict != "none"
     suspects = [s.name for s in found.suspect_coefficients]
@@ -176,7 +176,7 @@ def problem(ship: Ship, name: str, seed: int, exact: bool) -> dict[str, Any]:
         "found": " ".join(f"{e.id}:{e.confidence or 0.0:.2f}" for e in found.effects),
         "suspect": " ".join(suspects),
         "right": said if cause.foreign else named if cause.id else not found.effects,
-        "wrong and sure": sum((e.confidence or 0.0) >= SURE for e in told),
+        "wrong and sure": sum((e.confidence or 0.0) >= SURE for e in stated),
         "before": error.before,
         "after": error.after,
         "seconds": time.perf_counter() - begun,

@@ -1,4 +1,4 @@
-"""How soon a failing thruster is noticed, and how often one is told that does not fail.
+"""How soon a failing thruster is noticed, and how often one is reported that does not fail.
 
     python -m benchmarks.watch_delay                       # 200 runs
     python -m benchmarks.watch_delay --runs 24 --out results/watch
@@ -47,7 +47,7 @@ class Outcome(NamedTuple):
 
     Attributes:
         per_hour: false alarms in an hour without a failure.
-        found: share of the failures that are told.
+        found: share of the failures that are reported.
         right: share of these in which it is the right thruster.
         delay: median delay of these [s].
     """
@@ -107,11 +107,11 @@ def losses(out: Any) -> tuple[Any, Any]:
     return X, np.maximum(Y, N)
 
 
-def outcome(told: Sequence[Told], threshold: float, share: float | None = None) -> Outcome:
+def outcome(stated: Sequence[Told], threshold: float, share: float | None = None) -> Outcome:
     """False alarms of all runs, and failures of one share or all."""
     hours, alarms, failures = 0.0, 0, 0
     delays, right = [], []
-    for t in told:
+    for t in stated:
         above = t.score.max(axis=1) > threshold
         starts = np.flatnonzero(above & ~np.concatenate([[False], above[:-1]]))
         before = t.time < t.case.time
@@ -145,14 +145,14 @@ def report(out: Path, seed: int, detector: Sequence[Told], printed: Sequence[Tol
     )
     header = ["above", "false alarms per hour"]
     header += [f"{share:.0%}: found, right, median delay [s]" for share in SHARES]
-    for name, told, levels in (
+    for name, stated, levels in (
         ("watch_thrusters, probability", detector, PROBABILITIES),
         ("loss of thrust by concurrent learning, 7.2.5", printed, THRESHOLDS),
     ):
         made.heading(name)
         rows = []
         for level in levels:
-            by_share = [outcome(told, level, share) for share in SHARES]
+            by_share = [outcome(stated, level, share) for share in SHARES]
             cells = [f"{o.found:.0%}, {o.right:.0%}, {o.delay:.1f}" for o in by_share]
             rows.append([f"{level:g}", by_share[0].per_hour, *cells])
             made.result(f"{name} {level:g}", dict(zip(map(str, SHARES), by_share, strict=True)))

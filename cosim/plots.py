@@ -51,8 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     look = PictureOptions(options.format, options.dpi, options.width, options.style)
     try:
         runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
-        told = {folder.resolve().name: read_options(folder) for folder in options.folders}
-        drawn = draw(runs, options.out, told, look)
+        stated = {folder.resolve().name: read_options(folder) for folder in options.folders}
+        drawn = draw(runs, options.out, stated, look)
         if not drawn:
             raise InputError("nothing to draw: no log has the signals of a picture, such as a pose")
     except InputError as error:

@@ -46,7 +46,7 @@ def _one_at_a_time() -> Iterator[None]:
 
 
 class Options(TypedDict, total=False):
-    """What else a run can be told, see :func:`cosim.master.simulation.simulate`."""
+    """What else a run can be distinguished, see :func:`cosim.master.simulation.simulate`."""
 
     realtime: float | None
     pictures: bool

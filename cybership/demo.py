@@ -86,8 +86,8 @@ def demonstrate(out: Path) -> None:
     for label, controller_model in models.items():
         metrics = _sail("ellipse_bs", folders[label], hidden, controller_model, SECONDS).metrics
         print(f"   {label}: distance to the target {1e3 * metrics['e_pos_rms']:.0f} mm RMS")
-    told = {label: read_options(folder) for label, folder in folders.items()}
-    draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out, told)
+    stated = {label: read_options(folder) for label, folder in folders.items()}
+    draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out, stated)
 
 
 def _sail(

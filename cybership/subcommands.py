@@ -77,8 +77,8 @@ def purpose(name: str, module: str) -> str:
     try:
         spec = find_spec(module)  # imports the package around it
         source = Path(spec.origin if spec and spec.origin else "").read_text(encoding="utf-8")
-        told = ast.get_docstring(ast.parse(source)) or ""
+        stated = ast.get_docstring(ast.parse(source)) or ""
     except (Exception, SystemExit) as error:
         return f"cannot be run: {module}: {error}"
-    first = told.partition("\n")[0].rstrip(".")
+    first = stated.partition("\n")[0].rstrip(".")
     return first[:1].lower() + first[1:]

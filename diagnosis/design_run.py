@@ -92,14 +92,14 @@ def _played(options: argparse.Namespace, q: "Question", advance: Advance) -> Don
     from .report.formatting import write_json
 
     rounds = play(q, options.simulate, options.out, options.count, options.seed, advance)
-    shown, told = [], []
+    shown, stated = [], []
     for n, r in enumerate(rounds, 1):
         effects = ", ".join(f"{name} {c:.0%}" for name, c in r.effects.items()) or "no effect"
         shown += [f"Round {n}", *(f"  {line}" for line in r.plan.lines()), f"  learned: {effects}"]
-        told.append({"folder": f"round_{n}", "verdict": r.verdict, "confidence": r.effects})
+        stated.append({"folder": f"round_{n}", "verdict": r.verdict, "confidence": r.effects})
     certain = rounds[-1].certain
     end = "Every effect found is certain." if certain else "The effects do not become certain."
-    content = rounds[0].plan.content() | {"rounds": told, "certain": certain}
+    content = rounds[0].plan.content() | {"rounds": stated, "certain": certain}
     with together(options.out, [PLAN]) as new:
         write_json(new / PLAN, content)
     return Done(0, [*shown, end, f"{PLAN} and a folder for each round in {options.out}"])
@@ -112,9 +112,9 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
     effects = [*content["effects"], *content["possibilities"]]
     lines = [e["advice"] for e in effects if e["advice"]]
     lines = lines or ["The diagnosis leaves no candidates that a run could discriminate."]
-    told = {"runs": [], "inseparable": [], "advice": lines}
+    stated = {"runs": [], "inseparable": [], "advice": lines}
     with together(options.out, [PLAN]) as new:
-        write_json(new / PLAN, told)
+        write_json(new / PLAN, stated)
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
 
 

@@ -115,8 +115,8 @@ def _model_of(
         return nominal(loaded)
     if name is None:
         files = [getattr(run, "folder", run) for run in runs]  # of a result of a simulation
-        told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
-        name = told[0] if told else ship_of_model(file)
+        stated = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
+        name = stated[0] if stated else ship_of_model(file)
     return Model(ship=ship_with((), name))
 
 

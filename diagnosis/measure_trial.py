@@ -54,10 +54,10 @@ def _check_log(options: argparse.Namespace) -> None:
         "ship": (options.ship, ship, Path(options.ship or "").resolve() == Path(ship or "").resolve()),
         "trial": (options.trial, log.trial and log.trial.kind, False),
     }
-    for name, (given, told, same) in stated.items():
-        if given and told and given != told and not same:
+    for name, (given, reported, same) in stated.items():
+        if given and reported and given != reported and not same:
             raise InputError(
-                f"'{options.run}' is a log, and states the {name} '{told}'; --{name} {given} "
+                f"'{options.run}' is a log, and states the {name} '{reported}'; --{name} {given} "
                 f"contradicts that: leave --{name} out"
             )
 

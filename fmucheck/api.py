@@ -1,4 +1,4 @@
-"""The C functions of an FMI 2.0 co-simulation FMU, called so that a crash can be told.
+"""The C functions of an FMI 2.0 co-simulation FMU, called so that a crash can be distinguished.
 
 ctypes rather than FMPy's classes: every rule that runs the FMU starts a process of its own, which must
 be quick; and each call is noted before it is made, so that a crash or an endless loop has a name.
@@ -172,9 +172,9 @@ class InstanceOnTrial:
         status = do_step(self.component, c_double(time), c_double(size), 0)
         while status == PENDING and self.asynchronous:
             sleep(0.001)
-            told = c_int()
-            self.call("fmi2GetStatus", DO_STEP_STATUS, byref(told))
-            status = told.value
+            stated = c_int()
+            self.call("fmi2GetStatus", DO_STEP_STATUS, byref(stated))
+            status = stated.value
         self._judge("fmi2DoStep", status)
 
     def terminate(self) -> None:

@@ -38,10 +38,10 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
         except StatusError as refused:
             found.append(str(refused))
         except OSError as error:
-            told = f"the library cannot be loaded: {error}"
+            stated = f"the library cannot be loaded: {error}"
             if description.has("needsExecutionTool"):
-                return {"skipped": f"needsExecutionTool is declared, and {told}"}
-            found.append(told)
+                return {"skipped": f"needsExecutionTool is declared, and {stated}"}
+            found.append(stated)
         except Exception as error:
             found.append(f"internal error of the check: {error!r}; please report it")
         return {"found": found}

@@ -61,7 +61,7 @@ def addition(
     of: Ship,
     before: Values,
     after: Values,
-    told: Mapping[str, Line | float],
+    stated: Mapping[str, Line | float],
     given: Mapping[str, Line],
     beside: Mapping[str, Line],
 ) -> Component:
@@ -70,7 +70,7 @@ def addition(
     Args:
         of: the ship.
         before, after: parameters of its vessel and thrusters in the two models.
-        told: pose or velocity -> how the FMU tells it; a number: it stays the same.
+        stated: pose or velocity -> how the FMU tells it; a number: it stays the same.
         given: force or command -> how the FMU takes it.
         beside: force or acceleration -> how the FMU takes what acts beside all else; of an axis that is
             missing here, the force is added to that which is given.
@@ -80,7 +80,7 @@ def addition(
     plants = [_params(drive, v["thrusters"]) for v in (before, after)]
     drives = [drive.prepared(p) for p in plants]
     start = packer(drive.inputs)([v.start for v in variables(drive.inputs)])
-    columns = [name for name, line in told.items() if isinstance(line, Line)]
+    columns = [name for name, line in stated.items() if isinstance(line, Line)]
     inputs = group_of(
         "Inputs",
         [*commands, *(Variable(f"from_{name}", "1", f"{name} of the FMU", 0.0) for name in columns)],
@@ -99,7 +99,7 @@ def addition(
     def moving(s: Fields, i: Fields, h: Number) -> tuple[State, Triple]:
         """The FMU's state, and its acceleration over the last step."""
         raw = dict(zip(columns, flatten(i)[len(commands) :], strict=True))
-        now = {n: x.gain * raw[n] + x.offset if isinstance(x, Line) else x for n, x in told.items()}
+        now = {n: x.gain * raw[n] + x.offset if isinstance(x, Line) else x for n, x in stated.items()}
         short, begun = fmax(h, LEAST), (s.begun > 0.5) & (h > LEAST)
         if not all(n in now for n in POSE):
             dx, dy = rotate_to_earth(s.psi, now["u"], now["v"])

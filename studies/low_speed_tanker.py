@@ -145,9 +145,9 @@ def compare_tests(report: Report, runs: Sequence[WeakWindows], before: Errors, a
     ]
     windows = [f"windows of {h:.0f} s" for h in HORIZONS]
     report.table(["test", *windows, *quantities], rows)
-    told = (f"{n} in {q}" for n, q in zip((pairs > 1.0).sum(axis=0), quantities, strict=True))
+    stated = (f"{n} in {q}" for n, q in zip((pairs > 1.0).sum(axis=0), quantities, strict=True))
     report.text(
-        f"Of {len(runs)} tests, the errors are larger than the published model's: {'; '.join(told)}."
+        f"Of {len(runs)} tests, the errors are larger than the published model's: {'; '.join(stated)}."
     )
 
 
@@ -162,8 +162,8 @@ def learn(rest: Sequence[WeakWindows], model: Model, search: bool) -> tuple[Lear
     if fit is None:
         raise InputError("these tests do not determine the coefficients")
     moved = {n: x for n, x in fit.findings.moved.items() if abs(x) > MOVED}
-    told = ", ".join(f"{n} {x:+.1f}" for n, x in sorted(moved.items(), key=lambda m: -abs(m[1])))
-    return LearnedFit(fit.findings.model, fit.bands), told
+    stated = ", ".join(f"{n} {x:+.1f}" for n, x in sorted(moved.items(), key=lambda m: -abs(m[1])))
+    return LearnedFit(fit.findings.model, fit.bands), stated
 
 
 def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
@@ -197,15 +197,15 @@ def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
         )
         after: Errors = {}
         for left_out in dealt(runs, folds):
-            fit, told = learn([w for w in runs if w not in left_out], model, search)
+            fit, stated = learn([w for w in runs if w not in left_out], model, search)
             after |= errors(left_out, fit.model, fit)
-            report.text(f"Without {', '.join(w.run.name for w in left_out)}: {told}.")
+            report.text(f"Without {', '.join(w.run.name for w in left_out)}: {stated}.")
         ratios = table(report, "learned", after) / first
-        told = (
+        stated = (
             f"{r[0]:.2f} in position and {r[1]:.2f} in heading over {seconds:.0f} s"
             for r, seconds in zip(ratios, HORIZONS, strict=True)
         )
-        report.text(f"Relative to the published model, all tests: {'; '.join(told)}.")
+        report.text(f"Relative to the published model, all tests: {'; '.join(stated)}.")
         report.heading("Test by test")
         report.text("Errors of each test, left out, over those of the published model.")
         compare_tests(report, runs, published, after)

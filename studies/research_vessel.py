@@ -154,8 +154,8 @@ def sensors(report: Report, trials: Sequence[tuple[Run, Examined]]) -> None:
         rates = [f.value for f in examined.findings if f.kind == "clock_rate"]
         others = [f.sentence for f in examined.findings if f.kind != "clock_rate"]
         if rates:
-            told = f"{min(rates):.2f} to {max(rates):.2f} s pass in one second of the log"
-            others.insert(0, f"the clock: {told}, in {len(rates)} stretches")
+            stated = f"{min(rates):.2f} to {max(rates):.2f} s pass in one second of the log"
+            others.insert(0, f"the clock: {stated}, in {len(rates)} stretches")
         report.text(
             f"{run.name}: over {HORIZON:g} s integrated speed and heading differ from the position "
             f"by {closure(run):.3g} m (median) as logged, by {closure(examined.run):.3g} m as "

@@ -144,8 +144,8 @@ def write_folds(report: Report, folds: Sequence[ShipFold]) -> None:
     header = ["run", "position [m]", "heading [°]", *forces, *(f"{name} [N]" for name in outputs)]
     rows = np.array([_numbers(e, outputs) for e in errors])  # (runs, quantities, 2)
     names = [e.run for e in errors]
-    for told, pair in zip(names, rows, strict=True):
-        report.result(told, pair)
+    for stated, pair in zip(names, rows, strict=True):
+        report.result(stated, pair)
     overall = {"root mean square": np.sqrt(np.mean(rows**2, axis=0)), "median": np.median(rows, axis=0)}
     report.table(
         header,

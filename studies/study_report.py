@@ -240,8 +240,8 @@ class Report:
             runs: label -> folder of the log; read only where figures are drawn.
         """
         if self.draws:
-            told = {label: read_options(log) for label, log in runs.items()}
-            draw({k: dict(read_log(log)) for k, log in runs.items()}, self.folder / name, told)
+            stated = {label: read_options(log) for label, log in runs.items()}
+            draw({k: dict(read_log(log)) for k, log in runs.items()}, self.folder / name, stated)
 
     def result(self, name: str, value: Any) -> None:
         """Numbers for ``results.json``: nested mappings, sequences, named tuples, arrays."""

@@ -27,9 +27,9 @@ def column(number):
 def test_aims_of_logs_are_those_of_the_results(number, name):
     ways = json.loads((BENCHMARKS / "logs" / f"{name}_learned.json").read_text("utf-8"))["ways"]
     found = dict(aims([Recorded.of(way) for way in ways], LOGS[name]))
-    told = [re.findall(r"\d+ (?:channels )?of \d+|\d+\.\d\d|\d+ are", text) for text in found.values()]
+    stated = [re.findall(r"\d+ (?:channels )?of \d+|\d+\.\d\d|\d+ are", text) for text in found.values()]
     refused, known, bounds, doubted, others, kept, leading, sure, errors = (
-        [n.replace(" channels", "").removesuffix(" are") for n in row] for row in told
+        [n.replace(" channels", "").removesuffix(" are") for n in row] for row in stated
     )
     cells = [refused, known[:1], [*bounds, known[1]], doubted, others, kept, leading, sure, errors]
     for (row, cell), numbers in zip(column(number).items(), cells, strict=True):
@@ -89,8 +89,8 @@ def test_calibrated_ships_are_those_of_their_studies():
         assert cells[f"tanker, {name}"] == [f"{x:.1f}" for x in pair]
     vessel = results("research_vessel")
     for k, (name, pair) in enumerate({"position": "[m]", "heading": "[°]"}.items()):
-        told = cells[f"research vessel, {name} over 60 s, median of windows {pair}"]
-        assert told == [f"{when[k]:.1f}" for when in vessel["medians of windows"]]
+        stated = cells[f"research vessel, {name} over 60 s, median of windows {pair}"]
+        assert stated == [f"{when[k]:.1f}" for when in vessel["medians of windows"]]
     circles = np.array(vessel["circles"])  # measured, before, after
     off = 100.0 * np.median(np.abs(circles[:, 1:] / circles[:, :1] - 1.0), axis=0)
     for k, name in enumerate(("speed", "yaw rate")):

@@ -153,9 +153,9 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
         assert {name: row[name] for name in fresh.metrics} == fresh.metrics
         log = base / "out" / "logs" / row["hash"][:16] / "log.csv"
         assert log.read_bytes() == (base / "fresh" / "log.csv").read_bytes()
-    told = json.loads((base / "out" / "campaign.json").read_text())
-    assert (told["status"], told["runs"], told["done"]) == ("done", 4, 4)
-    assert told["versions"]["cybership"]
+    stated = json.loads((base / "out" / "campaign.json").read_text())
+    assert (stated["status"], stated["runs"], stated["done"]) == ("done", 4, 4)
+    assert stated["versions"]["cybership"]
 
 
 def test_a_value_in_a_group_is_set_after_the_group(base):
@@ -183,8 +183,8 @@ def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native, monkeypat
         assert any("--no-native" in note for note in notes) == kind
         assert f"note: made for {kind}" in notes
         folders = [out / "logs" / h[:16] for h in made["hash"]]
-        told = [json.loads((folder / "log.json").read_text()) for folder in folders]
-        assert [t["fmus"]["vessel"]["native"] for t in told] == [kind] * 2
+        stated = [json.loads((folder / "log.json").read_text()) for folder in folders]
+        assert [t["fmus"]["vessel"]["native"] for t in stated] == [kind] * 2
         logs[kind] = [(folder / "log.csv").read_bytes() for folder in folders]
         tables[kind] = made.drop(columns="wall_s")
     assert tables[True].equals(tables[False])
@@ -232,8 +232,8 @@ def test_an_interrupt_of_the_first_table_is_told_in_the_summary(base, monkeypatc
     with pytest.raises(KeyboardInterrupt):
         main([str(path), "--workers", "0", "--out", str(base / "out")])
     assert pandas.read_parquet(base / "out" / "runs.parquet").empty
-    told = json.loads((base / "out" / "campaign.json").read_text())
-    assert (told["status"], told["done"]) == ("interrupted", 0)
+    stated = json.loads((base / "out" / "campaign.json").read_text())
+    assert (stated["status"], stated["done"]) == ("interrupted", 0)
 
 
 def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
@@ -260,7 +260,7 @@ def test_the_table_is_whole_before_workers_are_asked_to_end(base, monkeypatch):
 
     from cosim.dispatch.dask_workers import DaskWorkers
 
-    out, given, told, ask, cancel = base / "out", [], [], DaskWorkers._next, Client.cancel
+    out, given, stated, ask, cancel = base / "out", [], [], DaskWorkers._next, Client.cancel
 
     def interrupted(self, ended):
         if len(given) == 2:
@@ -269,7 +269,7 @@ def test_the_table_is_whole_before_workers_are_asked_to_end(base, monkeypatch):
         return given[-1]
 
     def recorded(self, futures, **options):
-        told.append(json.loads((out / "campaign.json").read_text()))
+        stated.append(json.loads((out / "campaign.json").read_text()))
         return cancel(self, futures, **options)
 
     monkeypatch.setattr(DaskWorkers, "_next", interrupted)
@@ -278,8 +278,8 @@ def test_the_table_is_whole_before_workers_are_asked_to_end(base, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         cosim.run_campaign(path, out, workers=2)
     journal = (out / JOURNAL).read_text().splitlines()
-    assert [content["status"] for content in told] == ["interrupted"]
-    assert told[0]["done"] == len(journal) == len(pandas.read_parquet(out / "runs.parquet")) >= 2
+    assert [content["status"] for content in stated] == ["interrupted"]
+    assert stated[0]["done"] == len(journal) == len(pandas.read_parquet(out / "runs.parquet")) >= 2
 
 
 def test_a_failed_run_is_a_row_with_its_message(base, chain, plain_fmu):

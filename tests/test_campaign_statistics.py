@@ -48,14 +48,14 @@ def test_rule_stops_when_the_interval_of_the_pairs_is_narrow_enough():
         ended[case.number] = rows[case.number]
         if rule.satisfied(ended.get):
             break
-    told = rule.verdict(ended.get)
+    stated = rule.verdict(ended.get)
     # 1.96² · 1² / 0.4² = 24; unpaired it would take 10² times as many.
-    assert 15 <= told["pairs"] <= 40
-    _, low, high = told["difference"]["b"]
+    assert 15 <= stated["pairs"] <= 40
+    _, low, high = stated["difference"]["b"]
     assert high - low <= 0.8
     assert low < 3.0 < high
     counted = rule.counted(ended.get)
-    assert len(counted) == 2 * told["pairs"]
+    assert len(counted) == 2 * stated["pairs"]
     # It is decided by the order of the pairs, not by which of them ended first.
     assert StopRule("c W 0.4", cases, 7).counted(rows.get) == counted
 
@@ -70,9 +70,9 @@ def test_interval_of_the_rule_holds_the_difference_as_often_as_it_says():
         for _ in range(150):
             drawn = rng.normal(0.0, spread, len(seeds))
             rows = outcome(cases, lambda c, d=drawn: d[c.values["seed"]] * (c.values["c"] == "b"))
-            told = StopRule("c W 1.0", cases, 0).verdict(rows.get)
-            assert told["known"]
-            _, low, high = told["difference"]["b"]
+            stated = StopRule("c W 1.0", cases, 0).verdict(rows.get)
+            assert stated["known"]
+            _, low, high = stated["difference"]["b"]
             inside.append(low <= 0.0 <= high)
         assert np.mean(inside) > 0.93 - 2.0 * math.sqrt(0.05 * 0.95 / 150)
 
@@ -81,9 +81,9 @@ def test_shares_are_of_the_ratio_and_failed_pairs_are_left_out():
     cases = grid("ab", range(12))
     rows = outcome(cases, lambda c: 2.0 * (1.1 if c.values["c"] == "b" else 1.0))
     rows[3] = RunRow("failed", "broke", 0.0, {}, {})
-    told = StopRule("c W 1%", cases, 0).verdict(rows.get)
-    assert told["ratio_less_one"]["b"] == pytest.approx([0.1] * 3)
-    assert FEWEST_PAIRS <= told["pairs"] <= 11
+    stated = StopRule("c W 1%", cases, 0).verdict(rows.get)
+    assert stated["ratio_less_one"]["b"] == pytest.approx([0.1] * 3)
+    assert FEWEST_PAIRS <= stated["pairs"] <= 11
 
 
 @pytest.mark.parametrize(

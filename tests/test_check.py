@@ -413,10 +413,10 @@ def test_command_tells_findings_with_their_clause(tmp_path):
     # A file that is no FMU does not take the results of the others away, wherever options stand.
     done = run_check(path, *only, "--json", __file__)
     assert (done.returncode, done.stderr.count("error: ")) == (2, 1)
-    told = json.loads(done.stdout)
-    assert told["findings"] == 1
-    assert told["fmus"][0]["checks"]["limits"]["found"] == ["T: start 1 is outside of 2 to inf"]
-    assert told["fmus"][0]["checks"]["life"]["skipped"]
+    stated = json.loads(done.stdout)
+    assert stated["findings"] == 1
+    assert stated["fmus"][0]["checks"]["limits"]["found"] == ["T: start 1 is outside of 2 to inf"]
+    assert stated["fmus"][0]["checks"]["life"]["skipped"]
 
 
 @pytest.mark.parametrize("columns", [60, 80, 133])

@@ -108,8 +108,8 @@ def test_units_of_a_moment_are_read_as_they_are_usually_written(
     )
     table = table.assign(x=0.1 * table.time, tau_X=np.sin(table.time), **{name: np.cos(table.time)})
     found = propose(written(tmp_path / "a.csv", table))
-    told = found.needed["columns"]["tau_N"]
-    assert told == (column["name"] if isinstance(column, dict) and len(column) == 1 else column)
+    reported = found.needed["columns"]["tau_N"]
+    assert reported == (column["name"] if isinstance(column, dict) and len(column) == 1 else column)
     assert found.unused == []
     assert found.run is not None
     largest = 1e3 if "k" in name else 1.0
@@ -121,9 +121,9 @@ def test_units_of_a_moment_are_read_as_they_are_usually_written(
 
 def test_a_unit_that_is_not_known_has_a_line_with_its_factor(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", zigzag(x="x [fathom]"))
-    with pytest.raises(InputError, match="with its factor to m ") as told:
+    with pytest.raises(InputError, match="with its factor to m ") as reported:
         propose(path, TANKER)
-    line = str(told.value).partition("put ")[2].partition(" with its factor to m ")[0]
+    line = str(reported.value).partition("put ")[2].partition(" with its factor to m ")[0]
     columns = json.loads(line)["columns"]
     columns["x"]["factor"] = 1.8288
     (tmp_path / "a.csv.json").write_text(json.dumps({"columns": columns}))
@@ -258,8 +258,8 @@ def test_commands_far_beyond_their_limits_are_in_the_unit_within(
     assert {s: layout.column(s).unit for s in units} == units
     assert {s: layout.column(s).name for s in names} == names
     # What is stated stands.
-    told = {"columns": {"rudder.delta": {"name": "rudder_cmd", "factor": 0.5}}}
-    (tmp_path / "a.csv.json").write_text(json.dumps(told))
+    reported = {"columns": {"rudder.delta": {"name": "rudder_cmd", "factor": 0.5}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(reported))
     column = propose(tmp_path / "a.csv", TANKER).layout.column("rudder.delta")
     assert (column.factor, column.unit) == (0.5, None)
 
@@ -448,12 +448,12 @@ def test_blanks_have_likely_columns_by_the_motion(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", table)
     done = command(propose_columns.main, path, "--ship", "kvlcc2", "--write")
     assert (done.returncode, done.stderr) == (0, "")
-    told = " ".join(done.stdout.split())
-    assert "blank: propeller.n; likely columns: 'channel 4' (correlates +0." in told
-    assert "with the surge speed)" in told
-    assert "blank: rudder.delta; likely columns: 'channel 7' (correlates +0." in told
-    assert "'channel 5' (" not in told
-    assert "'channel 6' (" not in told
+    reported = " ".join(done.stdout.split())
+    assert "blank: propeller.n; likely columns: 'channel 4' (correlates +0." in reported
+    assert "with the surge speed)" in reported
+    assert "blank: rudder.delta; likely columns: 'channel 7' (correlates +0." in reported
+    assert "'channel 5' (" not in reported
+    assert "'channel 6' (" not in reported
     blank = json.loads((tmp_path / "a.csv.json").read_text())
     assert blank["columns"]["rudder.delta"] == blank["columns"]["propeller.n"] == ""
     with pytest.raises(InputError, match=r"a\.csv\.json': columns\.propeller\.n is blank; put the name"):
@@ -536,11 +536,11 @@ def test_what_is_stated_is_kept(tmp_path: Path) -> None:
     (tmp_path / "a.csv.json").write_text(json.dumps(stated))
     done = command(propose_columns.main, path, "--ship", "kvlcc2", "--write", "--overwrite")
     assert done.returncode == 0
-    told = json.loads((tmp_path / "a.csv.json").read_text())
-    assert told["columns"]["psi"] == stated["columns"]["psi"]
-    assert told["trial"] == "zigzag"
-    assert told["columns"]["rudder.delta"] == ""
-    assert told["columns"]["x"] == NAMES["x"]
+    reported = json.loads((tmp_path / "a.csv.json").read_text())
+    assert reported["columns"]["psi"] == stated["columns"]["psi"]
+    assert reported["trial"] == "zigzag"
+    assert reported["columns"]["rudder.delta"] == ""
+    assert reported["columns"]["x"] == NAMES["x"]
 
 
 def test_a_blank_that_is_there_is_filled_where_it_is_known(tmp_path: Path) -> None:
@@ -560,9 +560,9 @@ def test_a_blank_that_is_filled_gets_the_unit_in_its_name(tmp_path: Path) -> Non
     beside.write_text(json.dumps({"columns": filled}))
     done = command(propose_columns.main, path, "--ship", "kvlcc2", "--write", "--anyway")
     assert (done.returncode, done.stderr) == (0, "")
-    told = json.loads(beside.read_text())["columns"]
-    assert told["propeller.n"] == {"name": "engine_rpm", "unit": "rpm"}
-    assert told["rudder.delta"] == {"name": "helm angle [deg]", "unit": "deg", "noise": 0.1}
+    reported = json.loads(beside.read_text())["columns"]
+    assert reported["propeller.n"] == {"name": "engine_rpm", "unit": "rpm"}
+    assert reported["rudder.delta"] == {"name": "helm angle [deg]", "unit": "deg", "noise": 0.1}
     run = read(path, of=TANKER)
     np.testing.assert_allclose(np.ptp(run.commands, axis=0), [8.0, 0.6], rtol=1e-6)
 
@@ -577,12 +577,12 @@ def test_per_cent_of_a_shaft_speed_or_an_angle_are_those_of_its_limit(tmp_path: 
     path = written(tmp_path / "a.csv", table)
     named = {"propeller.n": "Main engine %", "rudder.delta": "rudder_pct"}
     (tmp_path / "a.csv.json").write_text(json.dumps({"columns": named}))
-    told = propose(path, TANKER).needed["columns"]
-    assert told["propeller.n"] == {
+    reported = propose(path, TANKER).needed["columns"]
+    assert reported["propeller.n"] == {
         "name": "Main engine %",
         "factor": pytest.approx(most / 100.0, rel=1e-5),
     }
-    assert told["rudder.delta"] == {
+    assert reported["rudder.delta"] == {
         "name": "rudder_pct",
         "factor": pytest.approx(full / 100.0, rel=1e-5),
     }
@@ -631,9 +631,9 @@ def test_directions_in_degrees_are_seen_by_their_values(tmp_path: Path, start: f
     table = zigzag().assign(TWS=8.0)
     blows = (start + 25.0 * np.sin(np.arange(len(table)))) % 360.0
     path = written(tmp_path / "a.csv", table.assign(TWD=blows))
-    told = propose(path, TANKER).needed["columns"]
-    assert told["wind_direction"] == {"name": "TWD", "unit": "deg"}
-    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told | {"wind_direction": "TWD"}}))
+    reported = propose(path, TANKER).needed["columns"]
+    assert reported["wind_direction"] == {"name": "TWD", "unit": "deg"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": reported | {"wind_direction": "TWD"}}))
     with pytest.raises(
         InputError, match=r'wind_direction up to [23]\d\d.*: is it in deg.*"unit": "deg"'
     ):
@@ -699,9 +699,9 @@ def test_what_only_one_has_stands_beside_it(tmp_path: Path) -> None:
         "--anyway",
     )
     assert json.loads((tmp_path / FOLDER_FILE).read_text()) == {"columns": NAMES}
-    told = "".join(done.stdout.split())  # lines end within a long path
-    assert "b.csv'alsoneeds" in told
-    assert '{"columns":{"r":"r_angvelo[rad/s]"}}' in told
+    reported = "".join(done.stdout.split())  # lines end within a long path
+    assert "b.csv'alsoneeds" in reported
+    assert '{"columns":{"r":"r_angvelo[rad/s]"}}' in reported
 
 
 def test_a_unit_that_one_shows_is_that_of_all(tmp_path: Path) -> None:
@@ -711,8 +711,8 @@ def test_a_unit_that_one_shows_is_that_of_all(tmp_path: Path) -> None:
     files = written(tmp_path / "a.csv", one), written(tmp_path / "b.csv", other)
     assert "unit" not in propose(files[1], TANKER).needed["columns"]["psi"]
     command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")
-    told = json.loads((tmp_path / FOLDER_FILE).read_text())["columns"]["psi"]
-    assert told == {"name": "heading", "unit": "deg"}
+    reported = json.loads((tmp_path / FOLDER_FILE).read_text())["columns"]["psi"]
+    assert reported == {"name": "heading", "unit": "deg"}
 
 
 def test_folders_and_texts_that_differ_are_refused(tmp_path: Path) -> None:
@@ -953,8 +953,8 @@ def test_a_heading_that_is_named_gets_the_unit_of_its_values(
     path = written(tmp_path / "a.csv", table)
     psi = {"name": "where it points", **stated}
     (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"psi": psi}}))
-    told = propose(path, TANKER).layout.column("psi")
-    assert (told.name, told.unit) == (psi["name"], stated.get("unit", "deg"))
+    reported = propose(path, TANKER).layout.column("psi")
+    assert (reported.name, reported.unit) == (psi["name"], stated.get("unit", "deg"))
 
 
 @pytest.mark.parametrize("factor", [None, 1.0], ids=["names alone", "with a factor"])
@@ -1065,8 +1065,13 @@ def test_the_side_of_a_rudder_may_have_a_column_of_its_own(
     angle = np.degrees(table["rudder_deg"])
     table = table.assign(rudder_deg=angle.abs(), rudder_dir=np.where(angle < 0.0, port, starboard))
     found = propose(written(tmp_path / "a.csv", table), TANKER)
-    told = found.layout.column("rudder.delta")
-    assert (told.name, told.unit, told.sign, told.negative) == ("rudder_deg", "deg", "rudder_dir", port)
+    reported = found.layout.column("rudder.delta")
+    assert (reported.name, reported.unit, reported.sign, reported.negative) == (
+        "rudder_deg",
+        "deg",
+        "rudder_dir",
+        port,
+    )
     assert found.run is not None
     np.testing.assert_allclose(found.run.commands[:, 1], np.radians(angle), atol=1e-9)
 

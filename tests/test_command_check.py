@@ -28,13 +28,13 @@ def run_of(ratios):
 
 def expected(ratios):
     """Axis and number of rows that are told, from cell to cell; None: nothing is."""
-    told = []
+    stated = []
     for k, full in enumerate(FULL):
         cells = [abs(row[k]) * full for row in ratios]
         false = [c for c in cells if c > SETTINGS.most_gain * full]
         if false and sum(false) > NEGLIGIBLE * sum(cells):
-            told.append((max(cells) / full, k, len(false)))
-    return max(told)[1:] if told else None
+            stated.append((max(cells) / full, k, len(false)))
+    return max(stated)[1:] if stated else None
 
 
 ratio = st.one_of(

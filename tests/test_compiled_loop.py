@@ -55,9 +55,9 @@ EVENTS = [
 def test_a_compiler_that_fails_is_told_with_what_it_says(does, why, tmp_path, monkeypatch):
     compiler = [sys.executable, "-c", f"import sys; {does}"]
     monkeypatch.setattr(library, "_compiler", lambda with_zig: compiler)
-    with pytest.raises(library.NoLibraryError) as told:
+    with pytest.raises(library.NoLibraryError) as stated:
         library._compiled(tmp_path, False)
-    assert str(told.value).startswith(f"compiler '{sys.executable}' {why}")
+    assert str(stated.value).startswith(f"compiler '{sys.executable}' {why}")
 
 
 def run(content, folder, loop, monkeypatch):

@@ -145,11 +145,11 @@ def test_dependencies_hold_against_perturbation(name):
     for _ in range(10):
         params, inputs, state = arguments(component, rng)
         outputs = directly(component, params, inputs, state, h)[-len(declared) :]
-        for told in set(declared):
-            moved = moved_but("inputs", inputs, told | held, 0.3)
+        for stated in set(declared):
+            moved = moved_but("inputs", inputs, stated | held, 0.3)
             changed = directly(component, params, moved, state, h)[-len(declared) :]
             for a, b, followed in zip(outputs, changed, declared, strict=True):
-                assert followed != told or abs(a - b) <= 1e-11
+                assert followed != stated or abs(a - b) <= 1e-11
 
 
 @every_component
@@ -165,10 +165,12 @@ def test_initial_dependencies_hold_against_perturbation(name):
     params = flatten(component.params())
     inputs = [rng.uniform(-0.5, 0.5) for _ in variables(component.inputs)]
     before = outputs(params, inputs)
-    for told in set(declared):
-        after = outputs(moved_but("params", params, told, 0.07), moved_but("inputs", inputs, told, 0.07))
+    for stated in set(declared):
+        after = outputs(
+            moved_but("params", params, stated, 0.07), moved_but("inputs", inputs, stated, 0.07)
+        )
         for a, b, followed in zip(before, after, declared, strict=True):
-            assert followed != told or a == b
+            assert followed != stated or a == b
 
 
 def test_steps_need_only_the_standard_library():

@@ -41,13 +41,13 @@ def stepped(confined, steps=1):
         instance.set_up(1.0)
         instance.enter_initialization()
         instance.exit_initialization()
-        memory.values[0], told = 1.0, []
+        memory.values[0], stated = 1.0, []
         for k in range(steps):
             access.put()
             access.step(0.1 * k)
-            told.append(memory.values[1])
+            stated.append(memory.values[1])
         instance.terminate()
-        return told
+        return stated
     finally:
         instance.free()
 

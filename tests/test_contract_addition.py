@@ -70,10 +70,10 @@ def values(**vessel):
     return {"vessel": {**CALM, **vessel}, "thrusters": {}}
 
 
-def beside(after, told=SEEN, given=None, acting=None, before=None):
+def beside(after, stated=SEEN, given=None, acting=None, before=None):
     """The component by which an FMU gets what a changed model has beyond another one."""
     given = {n: Line(1.0) for n in TAU} if given is None else given
-    return Stepped(addition(SHIP, before or values(), after, told, given, acting or {}))
+    return Stepped(addition(SHIP, before or values(), after, stated, given, acting or {}))
 
 
 def of_state(x=0.0, y=0.0, psi=0.0, u=0.0, v=0.0, r=0.0):
@@ -96,8 +96,8 @@ def test_more_drag_is_a_force_against_the_motion():
 
 
 def test_an_fmu_has_its_own_units():
-    told = {**SEEN, "u": Line(0.5, 0.1)}  # u = 0.5 raw + 0.1
-    run = beside(values(delta_X_u=-3.0), told, {"tau_X": Line(2.0, 0.3)})
+    stated = {**SEEN, "u": Line(0.5, 0.1)}  # u = 0.5 raw + 0.1
+    run = beside(values(delta_X_u=-3.0), stated, {"tau_X": Line(2.0, 0.3)})
     found = run(0.1, **ASKED, **of_state(u=0.2))
     assert found == pytest.approx({"to_tau_X": (0.6 - 3.0 * 0.2 - 0.3) / 2.0})
 
@@ -126,8 +126,8 @@ def test_a_heavier_ship_needs_a_force_by_the_acceleration_that_the_fmu_has():
 
 
 def test_a_velocity_that_is_not_told_is_that_of_the_pose():
-    told = {name: Line(1.0) for name in POSE}
-    run = beside(values(delta_X_u=-3.0), told)
+    stated = {name: Line(1.0) for name in POSE}
+    run = beside(values(delta_X_u=-3.0), stated)
     psi = 3.1
 
     def pose(way):
@@ -137,7 +137,7 @@ def test_a_velocity_that_is_not_told_is_that_of_the_pose():
     assert run(0.5, **ASKED, **pose(0.0))["to_tau_X"] == pytest.approx(0.6)
     assert run(0.5, **ASKED, **pose(0.1))["to_tau_X"] == pytest.approx(0.6 - 3.0 * 0.2)
     # A turn through south is small.
-    run = beside({"vessel": {**CALM, "delta_N_r": -2.0}, "thrusters": {}}, told)
+    run = beside({"vessel": {**CALM, "delta_N_r": -2.0}, "thrusters": {}}, stated)
     run(0.5, from_psi=3.1)
     turned = run(0.5, from_psi=0.2 + 3.1 - 2.0 * np.pi)
     assert turned["to_tau_N"] == pytest.approx(-2.0 * 0.2 / 0.5)
@@ -145,8 +145,8 @@ def test_a_velocity_that_is_not_told_is_that_of_the_pose():
 
 def test_a_pose_that_is_not_told_is_that_of_the_velocity():
     """A force to north on a ship that has turned by half a rad/s for a second acts by its heading."""
-    told = {name: Line(1.0) for name in VELOCITY}
-    run = beside(values(F_n=1.0), told)
+    stated = {name: Line(1.0) for name in VELOCITY}
+    run = beside(values(F_n=1.0), stated)
     moving = {"from_u": 0.0, "from_v": 0.0, "from_r": 0.5}
     for k in range(3):
         psi = 0.25 * (k + 1)

@@ -451,15 +451,15 @@ def test_a_plan_has_its_candidates_runs_and_what_they_compare_with():
 
 
 def test_the_content_of_a_plan_has_numbers_for_programs():
-    told = planned(2, inseparable=[(("b", "a"), ("a", "c"))]).content()
-    assert told["inseparable"] == [["a", "b", "c"]]
-    assert told["hypotheses"] == [{"ids": ["a"], "weight": 0.75}, {"ids": [], "weight": 0.25}]
-    assert [r["commands"] for r in told["runs"]] == ["commands_1.csv", "commands_2.csv"]
-    first = told["runs"][0]
+    stated = planned(2, inseparable=[(("b", "a"), ("a", "c"))]).content()
+    assert stated["inseparable"] == [["a", "b", "c"]]
+    assert stated["hypotheses"] == [{"ids": ["a"], "weight": 0.75}, {"ids": [], "weight": 0.25}]
+    assert [r["commands"] for r in stated["runs"]] == ["commands_1.csv", "commands_2.csv"]
+    first = stated["runs"][0]
     assert (first["minutes"], first["sure"], first["usual"]) == (4.0, 0.9, {"circle": 0.4})
     assert first["manoeuvres"][0]["numbers"] == [0.1235]
     assert first["margin"] == {"a": 0.345}
-    assert (told["seed"], told["criterion"], told["advice"]) == (3, "certainty", ["advice"])
+    assert (stated["seed"], stated["criterion"], stated["advice"]) == (3, "certainty", ["advice"])
 
 
 def test_a_page_says_how_to_carry_a_run_out():

@@ -44,11 +44,11 @@ class Instance:
 
     def whole_runs(self, runs, h):
         self.fmu.requests.append(len(runs))
-        told = [self.whole_run(*runs[0], h)]
+        stated = [self.whole_run(*runs[0], h)]
         for run in runs[1:]:
             self.reset()
-            told.append(self.whole_run(*run, h))
-        return told
+            stated.append(self.whole_run(*run, h))
+        return stated
 
     def whole_run(self, start, rows, steps, terms, h):
         if self.fmu.refuses == "always" or (self.fmu.refuses == "once" and not self.redoes):
@@ -76,7 +76,7 @@ def fmu_of(**more):
     model = SimpleNamespace(variables=variables, path=SimpleNamespace(name="m.fmu"))
     made = SimpleNamespace(
         model=model, made=[], asked=[], requests=[], resets=0, refuses="", most=np.inf, beyond=np.nan, resets_well=True,
-        closed=0, told=str, timeout=None,
+        closed=0, stated=str, timeout=None,
     )  # fmt: skip
     made.instance = lambda: Instance(made)
     made.close = lambda: setattr(made, "closed", made.closed + 1)
@@ -251,11 +251,11 @@ def predictor(
 ):
     """A predictor by an FMU of which only the answers are there."""
     made = object.__new__(FmuPredictor)
-    told = {
+    stated = {
         "inputs": {"tau_X": Column(name="force")}, "start": {s: Column(name=f"{s}_0") for s in start},
         "outputs": {s: Column(name=f"{s}_out") for s in outputs} | (fixed or {}),
     }  # fmt: skip
-    made.map = VariableMap(**told)
+    made.map = VariableMap(**stated)
     made.given = made.map
     made.lines = {
         "inputs": {"tau_X": Line(4.0, 2.0)}, "outputs": {s: LINES.get(s, Line(1.0, 0.0)) for s in outputs},
@@ -443,9 +443,11 @@ def execution(step=None):
 )
 def test_a_step_is_fixed_where_it_is_asked_for_or_cannot_change(asked, suggested, varies, step, fixed):
     fmu = object.__new__(Fmu)
-    told = SimpleNamespace(canHandleVariableCommunicationStepSize=varies)
+    stated = SimpleNamespace(canHandleVariableCommunicationStepSize=varies)
     fmu.execution = execution(asked)
-    fmu.model = SimpleNamespace(suggested_step=suggested, description=SimpleNamespace(coSimulation=told))
+    fmu.model = SimpleNamespace(
+        suggested_step=suggested, description=SimpleNamespace(coSimulation=stated)
+    )
     assert (fmu.step, fmu.fixed_step) == (step, fixed)
 
 
@@ -582,16 +584,16 @@ def test_the_inertia_is_that_by_which_it_answers_forces(inputs):
 
 def wrapped(monkeypatch, change, inputs=("tau_X", "tau_N"), disturbances=()):
     """What is written of a change of the model error (K, 3), and the arguments of the container."""
-    told = {
+    stated = {
         "inputs": {s: Column(name=f"in.{s}") for s in inputs}, "outputs": {"psi": Column(name="heading"), "u": 0.5},
         "start": {"x": Column(name="x_0"), "u": Column(name="u_out")},
         DISTURBANCES: {s: Column(name=f"d.{s}") for s in disturbances}, "run_in": 7.0,
     }  # fmt: skip
     causality = {"x_0": "parameter", "u_out": "output"}
     variables = {n: SimpleNamespace(name=n, causality=c) for n, c in causality.items()}
-    lines = {g: {s: Line(2.0, 0.0) for s in told[g]} for g in ("inputs", "outputs", DISTURBANCES)}
+    lines = {g: {s: Line(2.0, 0.0) for s in stated[g]} for g in ("inputs", "outputs", DISTURBANCES)}
     model = SimpleNamespace(variables=variables, path="m.fmu")
-    fmu = wrapper.Wrapped("m.fmu", model, VariableMap(**told), lines)
+    fmu = wrapper.Wrapped("m.fmu", model, VariableMap(**stated), lines)
     start, learned = Model(), Model({"delta_X_u": -2.0})
     monkeypatch.setattr(
         wrapper, "omega", lambda w, m: np.array(change) if m is start else 0.0 * np.array(change)
@@ -608,10 +610,10 @@ def wrapped(monkeypatch, change, inputs=("tau_X", "tau_N"), disturbances=()):
 
 
 def test_an_fmu_of_both_has_the_wires_of_all_signals(monkeypatch):
-    told, of_both, ((_path, _inner, source, wires, span, starts),) = wrapped(
+    stated, of_both, ((_path, _inner, source, wires, span, starts),) = wrapped(
         monkeypatch, [[0.5, 0.0, 0.0]], ("tau_X", "rudder.delta"), ("u_dot",)
     )
-    assert told == "found.fmu is m.fmu with the findings."
+    assert stated == "found.fmu is m.fmu with the findings."
     ends = {a.partition(".")[2]: b.partition(".")[2] for a, b in wires}
     assert ends == {
         "heading": "from_psi", "to_tau_X": "in.tau_X", "to_rudder_delta": "in.rudder.delta", "add_u_dot": "d.u_dot",
@@ -628,8 +630,8 @@ def test_an_fmu_of_both_has_the_wires_of_all_signals(monkeypatch):
 
 
 def test_without_an_input_for_the_force_none_is_written(monkeypatch):
-    told, of_both, written = wrapped(monkeypatch, [[0.0, 0.5, 0.0]])
-    assert "it needs tau_Y or v_dot" in told
+    stated, of_both, written = wrapped(monkeypatch, [[0.0, 0.5, 0.0]])
+    assert "it needs tau_Y or v_dot" in stated
     assert (of_both, written) == (None, [])
     assert wrapped(monkeypatch, [[0.0, 0.5, 0.0]], disturbances=("v_dot",))[1] is not None
     assert wrapped(monkeypatch, [[0.0, 0.5, 0.0]], inputs=("tau.force", "tau.angle"))[1] is not None

@@ -207,8 +207,8 @@ def test_whole_runs_are_apart_by_a_reset(served):
         [{"y": y}, np.array([[a, 0.0]]).tobytes().hex(), 1, []] for y, a in ((3.0, 1.0), (-1.0, 2.0))
     ]
     answers, made = served(*BEGIN, call("whole_runs", runs, 0.5))
-    told = [np.frombuffer(bytes.fromhex(x)).tolist() for x in json.loads(answers[-1][1])]
-    assert told == [[3.0, 3.5], [-1.0, 0.0]]
+    stated = [np.frombuffer(bytes.fromhex(x)).tolist() for x in json.loads(answers[-1][1])]
+    assert stated == [[3.0, 3.5], [-1.0, 0.0]]
     one = [
         "set up",
         "enter_initialization",

@@ -379,13 +379,18 @@ def test_runs_are_predicted_for_each_horizon_with_what_is_not_known(monkeypatch)
 
     monkeypatch.setattr(validation, "Predictions", predictions)
     monkeypatch.setattr(validation, "possible", lambda smoothed, horizon: int(horizon))
-    told = {"initial_state": "no noise is known", "current": {"position": np.zeros(1)}}
-    monkeypatch.setattr(validation, "sources_of", lambda *_: told)
+    stated = {"initial_state": "no noise is known", "current": {"position": np.zeros(1)}}
+    monkeypatch.setattr(validation, "sources_of", lambda *_: stated)
     monkeypatch.setattr(validation, "window_means", lambda p: {"u": p.horizon})
     notes = []
     judged = _JudgedRuns(compared(monkeypatch, runs), None, None, notes)
     (found,) = judged.predicted(4.0)
-    assert (found.name, found.sources, found.signals, found.same) == ("a", told, {"u": 4.0}, {"a", "b"})
+    assert (found.name, found.sources, found.signals, found.same) == (
+        "a",
+        stated,
+        {"u": 4.0},
+        {"a", "b"},
+    )
     assert found.learned is False
     assert judged.short == {4.0: {"b": 4}}
     assert notes == ["initial state: no noise is known", "b is too short"]
@@ -411,7 +416,7 @@ def test_what_nobody_may_conclude_is_listed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("parametric", "own", "by_user", "confinement", "told"),
+    ("parametric", "own", "by_user", "confinement", "stated"),
     [
         (True, False, False, "", "none needed: the model is parameters of this program"),
         (True, True, False, "", "unconfined: effects of the user (unconfined)"),
@@ -422,7 +427,7 @@ def test_what_nobody_may_conclude_is_listed(monkeypatch):
     ],
 )
 def test_what_keeps_the_code_of_a_model_from_the_data(
-    monkeypatch, parametric, own, by_user, confinement, told
+    monkeypatch, parametric, own, by_user, confinement, stated
 ):
     monkeypatch.setattr(validation, "foreign", lambda predictor: by_user)
     description = SimpleNamespace(outside=list("abcd"))
@@ -432,9 +437,9 @@ def test_what_keeps_the_code_of_a_model_from_the_data(
     effects = SimpleNamespace(files=["e.py"] if own else [])
     model = SimpleNamespace(ship=SimpleNamespace(effects=effects))
     comparison = SimpleNamespace(predictor=predictor, evaluations=[SimpleNamespace(model=model)])
-    assert validation._confinement(comparison) == told
+    assert validation._confinement(comparison) == stated
     said = [*validation._of_code(comparison)]
-    assert (len(said) == 2) == told.startswith("unconfined")
+    assert (len(said) == 2) == stated.startswith("unconfined")
     assert said[-1].endswith("files outside of its own: a, b, c, ....")
     description.outside = list("abc")
     assert [*validation._of_code(comparison)][-1].endswith("own: a, b, c.")

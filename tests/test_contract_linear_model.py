@@ -58,11 +58,11 @@ def variable(name, start=0.0, reference=0, unit=None):
 def model(**more):
     names = ("p", "v", "der(p)", "der(v)", "p_seen", "w", "f")
     variables = {n: variable(n, 0.1 * k, k) for k, n in enumerate(names)}
-    told = SimpleNamespace(providesDirectionalDerivative=False)
+    stated = SimpleNamespace(providesDirectionalDerivative=False)
     return SimpleNamespace(
         variables=variables, suggested_step=None, path=SimpleNamespace(name="m.fmu"),
         reals=lambda causality: [variables["f"]] if causality == "input" else [],
-        description=SimpleNamespace(coSimulation=told), **more,
+        description=SimpleNamespace(coSimulation=stated), **more,
     )  # fmt: skip
 
 
@@ -224,13 +224,13 @@ def test_states_of_a_map_have_the_rates_that_are_declared():
 def test_states_of_a_ship_are_its_motion_where_it_is_set_and_seen(monkeypatch):
     made = model()
     made.description.derivatives = []
-    told = {
+    stated = {
         "start": {n: SimpleNamespace(name=f"{n}_0") for n in ("psi", "u", "x")},
         "outputs": {n: SimpleNamespace(name=f"{n}_out") for n in ("x", "u", "r")},
     }
-    monkeypatch.setattr(linear_model, "propose", lambda *_: SimpleNamespace(told=told.__getitem__))
+    monkeypatch.setattr(linear_model, "propose", lambda *_: SimpleNamespace(stated=stated.__getitem__))
     assert states_of(made, None) == [LinearState("x_0", "x_out", 1), LinearState("u_0", "u_out", 1)]
-    told["outputs"] = {}
+    stated["outputs"] = {}
     with pytest.raises(InputError, match=r"no state of 'm\.fmu' can be set"):
         states_of(made, None)
 
@@ -240,13 +240,13 @@ def test_files_have_values_units_and_eigenvalues(tmp_path):
     at = {"p": 0.3, "v": -0.2, "f": 1.5, "p_seen": 0.3, "w": 2.7}
     made = LinearModel(["p", "v"], ["f"], OUTPUTS, at, np.array([1.0, 2.0]), A, B, C, D, 0.0)
     assert made.write(tmp_path, units) == ["linear.json", "linear.mat"]
-    told = json.loads((tmp_path / "linear.json").read_text())
-    assert told["states"] == [
+    stated = json.loads((tmp_path / "linear.json").read_text())
+    assert stated["states"] == [
         {"name": "p", "unit": "m", "value": 0.3}, {"name": "v", "unit": "m/s", "value": -0.2},
     ]  # fmt: skip
-    assert [x["name"] for x in told["inputs"] + told["outputs"]] == ["f", "p_seen", "w"]
-    assert (told["A"], told["x_dot"]) == (A.tolist(), [1.0, 2.0])
-    real, imaginary = np.transpose(told["eigenvalues"])
+    assert [x["name"] for x in stated["inputs"] + stated["outputs"]] == ["f", "p_seen", "w"]
+    assert (stated["A"], stated["x_dot"]) == (A.tolist(), [1.0, 2.0])
+    real, imaginary = np.transpose(stated["eigenvalues"])
     # s^2 + 0.5 s + 2
     assert sorted(real + 1j * imaginary, key=lambda s: s.imag) == pytest.approx(
         [-0.25 - 1j * np.sqrt(2.0 - 0.0625), -0.25 + 1j * np.sqrt(2.0 - 0.0625)]

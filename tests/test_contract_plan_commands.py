@@ -50,11 +50,11 @@ def test_rounds_of_a_simulated_ship_are_told_and_written(tmp_path, monkeypatch, 
     assert shown[6] == (
         "Every effect found is certain." if certain else "The effects do not become certain."
     )
-    told = json.loads((tmp_path / "out" / "next.json").read_text())
-    assert (told["certain"], told["seed"]) == (certain, 7)
-    assert told["runs"] == [{"worst_distance": None}], "JSON has no infinity"
-    assert [r["folder"] for r in told["rounds"]] == ["round_1", "round_2"]
-    assert told["rounds"][1] == {
+    reported = json.loads((tmp_path / "out" / "next.json").read_text())
+    assert (reported["certain"], reported["seed"]) == (certain, 7)
+    assert reported["runs"] == [{"worst_distance": None}], "JSON has no infinity"
+    assert [r["folder"] for r in reported["rounds"]] == ["round_1", "round_2"]
+    assert reported["rounds"][1] == {
         "folder": "round_2",
         "verdict": "found",
         "confidence": {"N_r": 0.96, "X_u": 0.5},

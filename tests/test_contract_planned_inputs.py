@@ -201,10 +201,10 @@ def test_the_files_of_a_plan_have_its_inputs(tmp_path):
     names = plan_of_two().write(tmp_path)
     assert names == ["next.json", "plan.md", "commands_1.csv"]
     assert (tmp_path / "commands_1.csv").read_text() == "time,a\n0,1\n60,2\n180,3.5\n"
-    told = json.loads((tmp_path / "next.json").read_text())
-    assert [r["commands"] for r in told["runs"]] == ["commands_1.csv"]
-    assert [p["name"] for p in told["parameters"]] == ["k", "d"]
-    assert (told["seed"], told["criterion"], told["inseparable"]) == (3, "d-optimal", [])
+    stated = json.loads((tmp_path / "next.json").read_text())
+    assert [r["commands"] for r in stated["runs"]] == ["commands_1.csv"]
+    assert [p["name"] for p in stated["parameters"]] == ["k", "d"]
+    assert (stated["seed"], stated["criterion"], stated["inseparable"]) == (3, "d-optimal", [])
     page = (tmp_path / "plan.md").read_text().splitlines()
     assert page[2:5] == plan_of_two().lines()
     assert page[-1] == "Inputs over time: commands_1.csv."

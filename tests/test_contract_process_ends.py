@@ -103,9 +103,9 @@ def test_rows_of_a_run_are_kept_and_its_file_says_how_it_ended(died, tmp_path, m
     rows = 2 if rescued is None else 5
     assert code == FAILED
     assert text.endswith(f"; {rows} rows are kept in '{post_mortem._shown(str(folder))}'")
-    told = json.loads((folder / "log.json").read_text())
-    assert (told["status"], told["rows"]) == ("failed", rows)
-    assert told["message"].startswith("vessel: the simulating process died")
+    stated = json.loads((folder / "log.json").read_text())
+    assert (stated["status"], stated["rows"]) == ("failed", rows)
+    assert stated["message"].startswith("vessel: the simulating process died")
     (tmp_path / "scratch").mkdir()
     assert "rows" not in died(State(folder=str(tmp_path / "scratch"), numbers={LOGGING: 1}))[1]
 
@@ -128,8 +128,8 @@ def test_before_the_first_row_there_is_a_file_unless_the_user_has_ended_it(
     assert (tmp_path / "log.json").exists() != interrupted
     assert cleared == ([] if interrupted else [tmp_path])
     if not interrupted:
-        told = json.loads((tmp_path / "log.json").read_text())
-        assert (told["scenario"], told["rows"], told["status"]) == (1, 0, "failed")
+        stated = json.loads((tmp_path / "log.json").read_text())
+        assert (stated["scenario"], stated["rows"], stated["status"]) == (1, 0, "failed")
     assert code == (INTERRUPTED if interrupted else FAILED)
 
 
@@ -452,14 +452,14 @@ def test_namespaces_are_tried_in_a_process_of_its_own(server, monkeypatch, why):
 
 
 @pytest.mark.parametrize(
-    ("forks", "ends", "told", "refused"),
+    ("forks", "ends", "stated", "refused"),
     [
         ((0, 6), [(6, 0)], b"", False),
         ((0, 6), [(6, 256)], b"no own tree of files", False),
         ((0,), [], b"denied", True),
     ],
 )
-def test_the_process_that_tries_says_why_it_fails(server, monkeypatch, forks, ends, told, refused):
+def test_the_process_that_tries_says_why_it_fails(server, monkeypatch, forks, ends, stated, refused):
     system = System(*forks, ends=ends)
     of = server(system)
     system.pipe = lambda: (30, 31)
@@ -472,7 +472,7 @@ def test_the_process_that_tries_says_why_it_fails(server, monkeypatch, forks, en
     monkeypatch.setattr(fork_server, "available", lambda means, trial: trial(Confinement("", "", 4)))
     with pytest.raises(EndedError):
         of.serve(["namespaces"], "/own")
-    assert system.named("write") == [(31, told)]
+    assert system.named("write") == [(31, stated)]
     assert system.named("_exit") == [(0,)]
 
 

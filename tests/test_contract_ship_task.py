@@ -47,13 +47,13 @@ class Predictor:
 
     def __init__(self, inputs=("tau_X", "tau_N"), disturbances=("tau_Y",), whole=False, placed=False):
         self.whole, self.placed, self.asked = whole, placed, []
-        told = {
+        stated = {
             "inputs": {s: cause(f"in.{s}") for s in inputs},
             DISTURBANCES: {s: cause(f"d.{s}") for s in disturbances},
             "outputs": {s: cause(f"out.{s}") for s in (*POSE, "u")},
             "start": {s: cause(f"start.{s}") for s in ("x", "r", "mass")},
         }
-        self.map = SimpleNamespace(told=lambda group: told.get(group, {}))
+        self.map = SimpleNamespace(stated=lambda group: stated.get(group, {}))
         self.lines = {
             "outputs": {s: line(*LINES.get(s, (1.0, 0.0))) for s in (*POSE, "u")},
             "inputs": {s: line(4.0) for s in inputs}, DISTURBANCES: {s: line(-0.5) for s in disturbances},
@@ -126,9 +126,9 @@ def test_forces_may_be_constant_of_a_velocity_or_of_the_earth():
 def test_without_both_inputs_there_is_no_force_of_the_earth():
     assert not any(f.earth for f in task(Predictor(inputs=("tau_X",), disturbances=())).possible)
     alone = Predictor()
-    told = alone.map.told
-    alone.map.told = lambda group: {
-        k: v for k, v in told(group).items() if (group, k) != ("outputs", "psi")
+    stated = alone.map.stated
+    alone.map.stated = lambda group: {
+        k: v for k, v in stated(group).items() if (group, k) != ("outputs", "psi")
     }
     assert not any(f.earth for f in [*task(alone)._earth_forces()])
 
@@ -243,10 +243,10 @@ def test_a_task_has_the_parameters_of_a_file_or_those_that_are_proposed(monkeypa
     monkeypatch.setattr(parameter_file, "proposed", lambda model, mapped: ([], []))
     with pytest.raises(InputError, match="no parameter that can be calibrated"):
         ship_task.ship_task(options, paths, None, None)
-    told = predictor.map.told
+    stated = predictor.map.stated
     for outputs, wrong in ((POSE, False), (POSE[:2], True)):
-        predictor.map.told = lambda group, outputs=outputs: (
-            {s: cause(s) for s in outputs} if group == "outputs" else told(group)
+        predictor.map.stated = lambda group, outputs=outputs: (
+            {s: cause(s) for s in outputs} if group == "outputs" else stated(group)
         )
         message = "needs outputs for x, y and psi" if wrong else "no parameter"
         with pytest.raises(InputError, match=message):

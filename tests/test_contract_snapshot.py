@@ -156,16 +156,16 @@ def test_numbers_are_packed_to_the_bit():
 
 def test_a_page_has_the_signals_and_their_values():
     m = master()
-    told = snapshot.snapshot(m)
+    stated = snapshot.snapshot(m)
     slots = m.table.slots
-    assert told["signals"] == [*slots]
-    assert numbers(told["row"]) == m.table.values
-    assert told["logged"] == [slots["vessel.x"], slots["drive.n"]]
-    assert told["roles"]["pose"] == [slots["vessel.x"], -1, -1]
-    assert told["roles"]["force"] == [slots["drive.tau_X"]]
-    assert told["power"] == [slots["drive.power"]]
-    assert (told["step"], told["steps"], told["jacobi"], told["every"]) == (0.1, 3, True, 2)
-    assert (told["from"], told["to"], told["outline"]) == (1.0, None, None)
+    assert stated["signals"] == [*slots]
+    assert numbers(stated["row"]) == m.table.values
+    assert stated["logged"] == [slots["vessel.x"], slots["drive.n"]]
+    assert stated["roles"]["pose"] == [slots["vessel.x"], -1, -1]
+    assert stated["roles"]["force"] == [slots["drive.tau_X"]]
+    assert stated["power"] == [slots["drive.power"]]
+    assert (stated["step"], stated["steps"], stated["jacobi"], stated["every"]) == (0.1, 3, True, 2)
+    assert (stated["from"], stated["to"], stated["outline"]) == (1.0, None, None)
     # Where the force after limits is not there, what the controller asks for.
     asked = master(system(force=("drive.other",)))
     asked.system.scenario.roles.requested_force = ("drive.tau_X",)
@@ -211,8 +211,8 @@ def test_an_operation_is_planned_to_the_end_of_the_run(jacobi):
         asked.append(round(t, 9))
         return [10.0 * t] if t > 0.15 else None
 
-    told = snapshot.snapshot(master(operation=Add([4], plan), jacobi=jacobi))
-    (planned,) = told["fmus"][1]["on_inputs"]
+    stated = snapshot.snapshot(master(operation=Add([4], plan), jacobi=jacobi))
+    (planned,) = stated["fmus"][1]["on_inputs"]
     times = [0.0, 0.1, 0.2] if jacobi else [0.1, 0.2, 0.3]
     assert asked == times
     assert [*b64decode(planned["acts"])] == [t > 0.15 for t in times]
@@ -252,10 +252,10 @@ def test_events_are_in_order_and_those_at_the_start_have_been():
 
 def test_measured_poses_and_actuators_are_found():
     m = master()
-    told = snapshot.snapshot(m)
+    stated = snapshot.snapshot(m)
     slots = m.table.slots
-    assert told["measured"] == [slots["observer.x_m"]]
-    shown = {a["name"]: a for a in told["actuators"]}
+    assert stated["measured"] == [slots["observer.x_m"]]
+    shown = {a["name"]: a for a in stated["actuators"]}
     assert [*shown] == ["n", "power"], "neither a force, nor what nobody commands"
     assert shown["n"] == {
         "reference": 2, "name": "n", "unit": "1/s", "description": "the n", "min": -1.0, "max": 2.0,
@@ -343,11 +343,11 @@ def test_inputs_beyond_the_table_get_places_behind_it():
         SimpleNamespace(source=LINKS[0].source, target=signal("observer", more)),
         LINKS[1],
     ]
-    told = alternatives._option(of, "observer", slots)
-    assert numbers(told["values"]) == [6.0, 0.0, 0.0]
-    assert told["copies"] == [[1, 0, 1], [3, 0, 1]]
-    assert told["put"] == [[1, 1], [9, 3]]
-    assert told["got"] == [[2, 2]]
+    stated = alternatives._option(of, "observer", slots)
+    assert numbers(stated["values"]) == [6.0, 0.0, 0.0]
+    assert stated["copies"] == [[1, 0, 1], [3, 0, 1]]
+    assert stated["put"] == [[1, 1], [9, 3]]
+    assert stated["got"] == [[2, 2]]
     assert slots == {"vessel.x": 0, "observer.x_m": 1, "observer.x_hat": 2}
     assert alternatives._connections_elsewhere(of, "observer") == {("drive.tau_X", "vessel.tau_X")}
 

@@ -96,26 +96,26 @@ def test_the_interval_of_a_force_is_in_its_unit():
 
 
 def test_the_content_has_values_errors_and_what_was_rejected():
-    told = report().content()
-    assert told["verdict"] == "found"
-    k, d = told["parameters"]
+    stated = report().content()
+    assert stated["verdict"] == "found"
+    k, d = stated["parameters"]
     assert (k["name"], k["unit"], k["value"], k["z"], k["moved"]) == ("k", "N/m", 2.5, 1.0, True)
     assert k["prior"] == {"value": 2.0, "std": 0.5, "log": False, "origin": K.prior.origin}
     assert d["value"] == pytest.approx(4.0 * np.exp(-1.0))
-    (effect,) = told["effects"]
+    (effect,) = stated["effects"]
     assert (effect["id"], effect["input"], effect["confidence"]) == (FORCE.id, "f", 0.85)
     assert effect["coefficients"][FORCE.id]["value"] == -3.0
     assert effect["share_of_error"] == pytest.approx(1.0 - 0.5 * (0.25 + 0.05))
     assert effect["indistinguishable"] == ["f:v"]
-    assert told["suspect_coefficients"] == [{"name": "d", "z": -4.0, "value": d["value"]}]
-    assert told["withdrawn"] == []
-    assert told["remainder"]["outputs"]["w"] == {"rms": 2.0, "unit": "N", "share": 0.05, "p": 0.5}
-    a, b = told["errors"]
+    assert stated["suspect_coefficients"] == [{"name": "d", "z": -4.0, "value": d["value"]}]
+    assert stated["withdrawn"] == []
+    assert stated["remainder"]["outputs"]["w"] == {"rms": 2.0, "unit": "N", "share": 0.05, "p": 0.5}
+    a, b = stated["errors"]
     assert (a["run"], a["use"], a["held_out"], "change" in a) == ("a", "train", False, False)
     assert (b["held_out"], b["change"]) == (True, {"squares": -20.0, "standard_error": 3.0})
     assert b["outputs"]["w"] == {"before": 4.0, "after": 1.0, "unit": "N"}
-    assert told["data"] == {"samples": 321, "used": 321}
-    assert told["fmu"]["sha256"] == "hash"
+    assert stated["data"] == {"samples": 321, "used": 321}
+    assert stated["fmu"]["sha256"] == "hash"
     rejected = report(rejected="it predicts worse").content()["withdrawn"]
     assert rejected == [{"id": "parameters", "reason": "it predicts worse"}]
 
@@ -123,14 +123,14 @@ def test_the_content_has_values_errors_and_what_was_rejected():
 def test_files_have_the_values_and_their_covariance(tmp_path):
     made = report()
     made.write(tmp_path, {"program": "x"}, [])
-    told = json.loads((tmp_path / "posterior.json").read_text())
-    assert told["names"] == ["m.k", "m.d", FORCE.id]
-    assert told["units"] == ["N/m", "1", "N/(m/s)^2"]
-    assert told["mean"] == pytest.approx([2.5, 4.0 * np.exp(-1.0), -3.0])
+    stated = json.loads((tmp_path / "posterior.json").read_text())
+    assert stated["names"] == ["m.k", "m.d", FORCE.id]
+    assert stated["units"] == ["N/m", "1", "N/(m/s)^2"]
+    assert stated["mean"] == pytest.approx([2.5, 4.0 * np.exp(-1.0), -3.0])
     # d = 4 exp(z / 4): its slope is exp(z / 4).
     scale = np.array([0.5, np.exp(-1.0), 5.0])
-    np.testing.assert_allclose(told["covariance"], COVARIANCE * np.outer(scale, scale))
-    assert told["task"] == {"runs": ["a"]}
+    np.testing.assert_allclose(stated["covariance"], COVARIANCE * np.outer(scale, scale))
+    assert stated["task"] == {"runs": ["a"]}
     (found,) = cosim.read_parameters(tmp_path / "model.ssv").values.values()
     assert {n: p.value for n, p in found.items()} == pytest.approx({"k": 2.5, "d": 4.0 * np.exp(-1.0)})
     assert {n: p.unit for n, p in found.items()} == {"k": "N/m", "d": None}
@@ -177,10 +177,10 @@ def test_tables_have_a_row_for_each():
 def test_advice_names_the_run_that_discriminates():
     force = AdditionalForce("f", "v", 1)
     assert advice(Accepted(force, 0.5, 0.9, ())) == ""
-    told = advice(Accepted(force, 0.5, 0.9, ("f:1", "g:1")))
-    assert told == "f:v is indistinguishable from f:1, g:1: run with other levels of v."
-    told = advice(Accepted(AdditionalForce("f"), 0.5, 0.9, ("f:v",)))
-    assert told == "f:1 is indistinguishable from f:v: run with more motion."
+    stated = advice(Accepted(force, 0.5, 0.9, ("f:1", "g:1")))
+    assert stated == "f:v is indistinguishable from f:1, g:1: run with other levels of v."
+    stated = advice(Accepted(AdditionalForce("f"), 0.5, 0.9, ("f:v",)))
+    assert stated == "f:1 is indistinguishable from f:v: run with more motion."
 
 
 def test_the_terminal_has_names_to_the_left_and_numbers_to_the_right():

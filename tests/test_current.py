@@ -63,8 +63,8 @@ def under_way(d, share, seconds, u=None):
         past, out = thrusters.advance(past, thrusters.inputs(request(*now), seen), drive, h)
         tau = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
         rows.append((k * h, s.x, s.y, s.psi, *tau, *now))
-        s, told = parts.vessel.advance(s, tau, hull, h)
-        seen = told.velocity
+        s, stated = parts.vessel.advance(s, tau, hull, h)
+        seen = stated.velocity
     return np.array(rows)
 
 
@@ -98,9 +98,9 @@ def test_the_diagnosis_sees_thrusters_in_the_water_as_their_fmu_does():
     nominal = Model(ship=ship(description=d))
     V_n, V_e = water(d)
     (w,) = diagnosis.load([run], model=nominal)
-    told = nominal.plus({"V_n": V_n, "V_e": V_e})
-    left, missed = (np.sqrt(np.mean(omega(w, m) ** 2, axis=0)) for m in (told, nominal))
+    stated = nominal.plus({"V_n": V_n, "V_e": V_e})
+    left, missed = (np.sqrt(np.mean(omega(w, m) ** 2, axis=0)) for m in (stated, nominal))
     assert (left < 0.05 * missed).all()
     windows = Windows([w.smoothed], w.horizon)
-    off, off_nominal = (windows.errors(m).over_all()[0] for m in (told, nominal))
+    off, off_nominal = (windows.errors(m).over_all()[0] for m in (stated, nominal))
     assert off < 0.02 * off_nominal

@@ -184,14 +184,14 @@ sizes = st.floats(0.02, 30.0)
 
 
 @given(st.tuples(*[sizes] * 3), st.tuples(*[st.floats(0.001, 0.3)] * 3), st.tuples(*[st.booleans()] * 3))
-def test_a_gain_is_wrong_that_no_ship_has(value, share, told):
-    value, told = np.array(value), np.array(told)
+def test_a_gain_is_wrong_that_no_ship_has(value, share, stated):
+    value, stated = np.array(value), np.array(stated)
     error = value * share
-    found = ThrustGains(value, error, told)
+    found = ThrustGains(value, error, stated)
     low, high = value - 3.0 * error, value + 3.0 * error
-    all_weak = all(t and h < 0.4 for t, h in zip(told, high, strict=True))
+    all_weak = all(t and h < 0.4 for t, h in zip(stated, high, strict=True))
     for k in range(3):
-        assert found.wrong[k] == (told[k] and (low[k] > 2.5 or high[k] < 0.1 or all_weak))
+        assert found.wrong[k] == (stated[k] and (low[k] > 2.5 or high[k] < 0.1 or all_weak))
     wrong = [k for k in range(3) if found.wrong[k]]
     turned = ThrustGains(value * [-1.0, 1.0, 1.0], error, np.array([True, False, False]))
     assert turned.wrong.tolist() == [value[0] * (1.0 - 3.0 * share[0]) > -0.1, False, False]

@@ -619,11 +619,11 @@ def test_the_calibrated_parameter_set_has_the_error_that_is_told(quick, runs):
     out, _, _ = quick
     compared = diagnosis.compare([runs / "a.csv", runs / "b.csv"], model=out / learn.CALIBRATED)
     first = strict(out / learn.COMPARISON)["errors"]
-    for e, before, told in zip(
+    for e, before, stated in zip(
         compared.evaluations, first, strict(out / learn.CALIBRATION)["errors"], strict=True
     ):
-        assert e.before.position == pytest.approx(told["window_position_rmse"]["after"], rel=1e-6)
-        assert before["window_position_rmse"]["before"] == told["window_position_rmse"]["before"]
+        assert e.before.position == pytest.approx(stated["window_position_rmse"]["after"], rel=1e-6)
+        assert before["window_position_rmse"]["before"] == stated["window_position_rmse"]["before"]
 
 
 def test_all_effects_of_the_calibrated_model_are_those_of_the_initial_one(quick):

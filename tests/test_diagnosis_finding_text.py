@@ -42,9 +42,9 @@ def test_what_holds_in_single_runs_is_said_of_each_where_there_are_several(runs)
     each = {
         run: sentence(Found(EFFECTS[f.id], {name: times[f"{name}@{run}"]}, d.speeds)) for run in runs
     }
-    told = [f"Run {run}: {text}" for run, text in each.items()][:4]
-    told += ["diagnosis.json has 1 more."] if len(runs) > 4 else []
-    said = " ".join(told) if len(runs) > 1 else each["a"]
+    stated = [f"Run {run}: {text}" for run, text in each.items()][:4]
+    stated += ["diagnosis.json has 1 more."] if len(runs) > 4 else []
+    said = " ".join(stated) if len(runs) > 1 else each["a"]
     assert f.of_runs == runs
     assert _sentence(d, f, times) == said
 
@@ -126,9 +126,11 @@ def test_a_coefficient_whose_force_others_take_away_says_so(effect, others, said
     values = {"delta_X_uuu": -200.0} if effect == "X_uuu" else {"mass": 1.0}
     start = Model()
     learned = start.plus(values).plus(others)
-    told = of_whole_hull(Finding(effect, values, {}, 0.9, [], 0.9, 0.9), start, learned, (0.2, 0.1, 0.1))
-    assert told.endswith(said)
-    assert bool(told) is bool(said)
+    stated = of_whole_hull(
+        Finding(effect, values, {}, 0.9, [], 0.9, 0.9), start, learned, (0.2, 0.1, 0.1)
+    )
+    assert stated.endswith(said)
+    assert bool(stated) is bool(said)
 
 
 def test_of_a_finding_that_is_not_in_the_model_no_force_is_told():

@@ -180,11 +180,11 @@ def test_of_a_log_only_what_a_ship_would_tell_is_read(ellipse, tmp_path):
     np.testing.assert_allclose(run.tau_cmd[:, 2], log["thrusters.tau_cmd_N"], rtol=1e-15)
     np.testing.assert_allclose(run.commands[:, 0], log["thrusters.u_vsp_x"], rtol=1e-15)
     assert np.abs(run.pose[:, 0] - log["vessel.x"]).max() > 1e-4, "noise is part of the measurement"
-    told = pd.DataFrame(log)
-    for name in told.columns:
+    stated = pd.DataFrame(log)
+    for name in stated.columns:
         if name.startswith(("vessel.", "controller.", "guidance.")) or "_hat" in name:
-            told[name] = 1.0
-    told.to_csv(result.folder / "log.csv", index=False)
+            stated[name] = 1.0
+    stated.to_csv(result.folder / "log.csv", index=False)
     (result.folder / "log.json").write_text('{"scenario": "another"}')
     same(run, diagnosis.read(result.folder))
 
@@ -360,8 +360,8 @@ def test_without_power_there_is_no_force(tmp_path):
 def test_power_may_be_told_beside_the_five_commands(tmp_path):
     columns = dict(zip(FIVE, SHARES.T, strict=True)) | {"power_vsp": 50.0, "power_bow": 100.0}
     table(**columns).to_csv(tmp_path / "a.csv", index=False)
-    told = {name: {"name": name, "unit": "%"} for name in POWER}
-    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told}))
+    stated = {name: {"name": name, "unit": "%"} for name in POWER}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": stated}))
     run = diagnosis.read(tmp_path / "a.csv")
     np.testing.assert_allclose(run.tau_cmd[:, 0], 0.5 * ship().commanded_force(SHARES)[:, 0], atol=1e-12)
 
@@ -428,8 +428,8 @@ def test_roles_of_a_log_are_its_names(tmp_path):
     with_tau().rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(cosim.InputError, match="has no commands"):
         diagnosis.read(tmp_path)
-    told = {"metrics": {"from": None, "to": None}, "roles": roles}
-    (tmp_path / "log.json").write_text(json.dumps({"scenario": told}))
+    stated = {"metrics": {"from": None, "to": None}, "roles": roles}
+    (tmp_path / "log.json").write_text(json.dumps({"scenario": stated}))
     with_tau().to_csv(tmp_path / "plain.csv", index=False)
     same(diagnosis.read(tmp_path), diagnosis.read(tmp_path / "plain.csv"))
 
@@ -508,8 +508,8 @@ class TestColumns:
         table["psi"] = np.degrees(table["psi"]) % 360.0
         table[["x", "y"]] *= 1e5
         table.to_csv(tmp_path / "a.csv", index=False)
-        told = propose(tmp_path / "a.csv").needed["columns"]
-        assert {signal: column["unit"] for signal, column in told.items()} == {
+        stated = propose(tmp_path / "a.csv").needed["columns"]
+        assert {signal: column["unit"] for signal, column in stated.items()} == {
             "time": "ms", "x": "mm", "y": "mm", "psi": "deg",
         }  # fmt: skip
 
@@ -543,8 +543,8 @@ class TestColumns:
         done = command(propose_columns.main, tmp_path / "a.csv", "--write")
         assert (done.returncode, done.stderr) == (0, "")
         assert "no column is known for psi, tau_X, tau_Y, tau_N" in " ".join(done.stdout.split())
-        told = json.loads((tmp_path / "a.csv.json").read_text())["columns"]
-        assert told == {"x": "north", "y": "east"} | dict.fromkeys(
+        stated = json.loads((tmp_path / "a.csv.json").read_text())["columns"]
+        assert stated == {"x": "north", "y": "east"} | dict.fromkeys(
             ("psi", "tau_X", "tau_Y", "tau_N"), ""
         )
 

@@ -113,9 +113,9 @@ def test_preprocessing_does_not_decide_the_result(kind, change):
     assert (np.abs(after - before) <= 0.2 * before + lost).all()
     if change not in LOSING:
         assert (after[0] <= 1.2 * before[0]).all(), "the true model"
-    told = [note for note in other.notes if note.startswith("commands act")]
-    assert bool(told) <= bool(KINDS[kind][1]), "no delay is told where there is none"
-    if told:
+    stated = [note for note in other.notes if note.startswith("commands act")]
+    assert bool(stated) <= bool(KINDS[kind][1]), "no delay is told where there is none"
+    if stated:
         assert other.delay == pytest.approx(LATE, abs=0.05)
 
 

@@ -229,10 +229,10 @@ def test_a_reading_in_another_unit_scales_what_it_names_and_nothing_else(name, s
     run = replace(base(), commands=commands, signals=signals)
     seen = set()
     for r in readings(run, Model(ship=ship_with((), name))):
-        told = re.fullmatch(r"(.+) (?:is|are) in (\S+)(?: and (\S+))?", r.mistake)
-        if not told:
+        stated = re.fullmatch(r"(.+) (?:is|are) in (\S+)(?: and (\S+))?", r.mistake)
+        if not stated:
             continue
-        who, unit, moment = told.groups()
+        who, unit, moment = stated.groups()
         named = [s for part in who.split(" and ") for s in GROUPS.get(part, (part,))]
         expected = {s: FACTORS[moment if s == "tau_N" and moment else unit] for s in named}
         assert {s: c.factor for s, c in r.changes.items()} == pytest.approx(expected)
@@ -487,7 +487,7 @@ def test_the_gain_is_how_many_times_the_commanded_force_acts(k):
     assert g.value == pytest.approx([k] * 3, rel=0.1)
     assert (np.abs(g.value - k) < 4.0 * g.error).all()
     assert (g.error < 0.1 * k).all()
-    assert g.told.all()
+    assert g.stated.all()
 
 
 def circling(seconds=110.0, h=0.1, camera=0.1):
@@ -509,7 +509,7 @@ def circling(seconds=110.0, h=0.1, camera=0.1):
 def test_feedback_of_the_motion_tells_no_gain_of_its_own():
     w = weak_windows(smoothed(circling()))
     g = gains(w, Model())
-    assert not g.told[1:].any()
+    assert not g.stated[1:].any()
     refuse_implausible([w], Model())
 
 
@@ -520,7 +520,7 @@ def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():
 
     w = weak_windows(smoothed(edited(commands=one_thruster)))
     assert np.isnan(gains(w, Model()).value).tolist() == [False, True, True]
-    assert gains(weak_windows(smoothed(base())), Model()).told.all()
+    assert gains(weak_windows(smoothed(base())), Model()).stated.all()
 
 
 def test_late_clock_is_no_mistake():
@@ -679,11 +679,11 @@ def test_a_rudder_that_counts_from_hard_over_is_told_in_the_unit_of_its_column(w
     assert found is not None
     assert found.readings[0].mistake == f"rudder.delta counts from hard over to {way}"
     line = line_beside(path, w.run.layout, found.readings[0].changes)
-    told = json.loads(re.search(r"put (\{.*\}) into", line)[1])["columns"]["rudder.delta"]
-    assert told["unit"] == "deg"
-    assert told["offset"] == pytest.approx(-limit if way == "port" else limit, abs=0.01)
-    assert told.get("flip", False) == (way == "starboard")
-    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"rudder.delta": told}}))
+    stated = json.loads(re.search(r"put (\{.*\}) into", line)[1])["columns"]["rudder.delta"]
+    assert stated["unit"] == "deg"
+    assert stated["offset"] == pytest.approx(-limit if way == "port" else limit, abs=0.01)
+    assert stated.get("flip", False) == (way == "starboard")
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"rudder.delta": stated}}))
     (mended,) = diagnosis.gather([path], model=Model(ship=ship))
     np.testing.assert_allclose(mended.run.commanded["rudder.delta"], np.radians(right), atol=1e-3)
 
@@ -821,8 +821,8 @@ def test_the_side_car_of_a_run_that_seems_mirrored_is_written_all_the_same(tmp_p
     table.to_csv(tmp_path / "a.csv", index=False)
     done = command(propose_columns.main, tmp_path / "a.csv", "--write")
     assert done.returncode == 0
-    told = " ".join(done.stdout.split())
-    assert "not usable yet: run 'a': probably its heading is mirrored" in told
-    assert '{"name": "yaw", "unit": "deg", "flip": true}' in told
+    stated = " ".join(done.stdout.split())
+    assert "not usable yet: run 'a': probably its heading is mirrored" in stated
+    assert '{"name": "yaw", "unit": "deg", "flip": true}' in stated
     side_car = json.loads((tmp_path / "a.csv.json").read_text())
     assert side_car == {"columns": {"psi": {"name": "yaw", "unit": "deg"}}}

@@ -101,9 +101,9 @@ def test_none_is_claimed_where_it_is_not():
 
 
 def test_only_exponents_that_differ_are_told():
-    told = EFFECTS["power_exponent"].wording.sentence
-    bow = told({"exponent_vsp": 0.0, "exponent_bow": 0.5})
-    both = told({"exponent_vsp": 0.25, "exponent_bow": 0.5})
+    stated = EFFECTS["power_exponent"].wording.sentence
+    bow = stated({"exponent_vsp": 0.0, "exponent_bow": 0.5})
+    both = stated({"exponent_vsp": 0.25, "exponent_bow": 0.5})
     assert "bow thruster is 1.5" in bow
     assert "1.25" not in bow
     assert bow.count(" is ") == 2, "that it is not linear, and one exponent"

@@ -143,8 +143,8 @@ def test_coefficients_within_the_prior_are_no_finding():
 @pytest.mark.parametrize(("harm", "found"), [([True, False, True], 2), ([True, True], 0)])
 def test_an_effect_that_harms_alone_stays_with_the_next_or_goes(monkeypatch, harm, found):
     """One of two causes may harm the runs in which the other acts most, and both together do not."""
-    told = iter(harm)
-    monkeypatch.setattr(forward_selection, "harmful", lambda *_: next(told, True))
+    stated = iter(harm)
+    monkeypatch.setattr(forward_selection, "harmful", lambda *_: next(stated, True))
     pair = {"ship": {"delta_X_u": -3.0}, "thrusters": {"loss_yaw": 0.3}}
     learned = learn([data(**pair)[0]], 0.0)
     assert len(learned.effects) == found

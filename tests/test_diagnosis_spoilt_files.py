@@ -277,9 +277,9 @@ def test_only_an_absent_cause_told_with_confidence_is_wrong():
 
 
 def test_refusal_is_told_without_the_folder():
-    told = outcome("const_tau", good(), ["X_u"], 0)
-    assert (told.kind, told.wrong) == ("refused", False)
-    assert "tmp" not in told.text
+    stated = outcome("const_tau", good(), ["X_u"], 0)
+    assert (stated.kind, stated.wrong) == ("refused", False)
+    assert "tmp" not in stated.text
 
 
 def test_models_that_differ_in_the_measurement_alone_are_predicted_together():

@@ -217,10 +217,10 @@ def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     assert found.shares[0] > 0.5, "of its own runs"
     assert found.withdrawn == []
     content = diagnosis_content(found, None, [])
-    (told,) = content.effects
-    assert told.sentence.startswith("Run run0: The bow thruster fails from 1")
-    assert "Run run1: The bow" in told.sentence
-    runs = {name: c.run for name, c in told.coefficients.items()}
+    (stated,) = content.effects
+    assert stated.sentence.startswith("Run run0: The bow thruster fails from 1")
+    assert "Run run1: The bow" in stated.sentence
+    runs = {name: c.run for name, c in stated.coefficients.items()}
     assert runs["bow_outage_start_1"] == "run0"
     assert runs["bow_outage_start_1@run1"] == "run1"
 
@@ -443,7 +443,7 @@ def left_on(**significant):
     return Remainder(axes, "")
 
 
-def told(confidence, together, ids=("X_u",), start=None):
+def stated(confidence, together, ids=("X_u",), start=None):
     effects = [
         replace(
             finding(start or Model(), **{f"delta_{i}": -1.0}), confidence=confidence, together=together
@@ -456,11 +456,11 @@ def told(confidence, together, ids=("X_u",), start=None):
 @pytest.mark.parametrize(
     ("found", "refitted", "remains", "said"),
     [
-        (told(0.8, 0.8), False, False, "found"),
-        (told(0.79, 0.99), False, False, "ambiguous"),
-        (told(0.3, 0.5), False, False, "ambiguous"),
-        (told(0.3, 0.49), False, False, "unexplained"),
-        (told(np.nan, np.nan), False, False, "ambiguous"),
+        (stated(0.8, 0.8), False, False, "found"),
+        (stated(0.79, 0.99), False, False, "ambiguous"),
+        (stated(0.3, 0.5), False, False, "ambiguous"),
+        (stated(0.3, 0.49), False, False, "unexplained"),
+        (stated(np.nan, np.nan), False, False, "ambiguous"),
         (Findings(), True, False, "coefficients"),
         (Findings(), False, True, "unexplained"),
         (Findings(), False, False, "none"),
@@ -486,7 +486,7 @@ def test_a_calibration_with_more_than_coefficients_explains_nothing(values, said
 
 
 def test_verdict_goes_on_without_what_is_not_believed():
-    unlikely, sure = told(0.1, 0.2, ["N_r"]), told(0.9, 0.9)
+    unlikely, sure = stated(0.1, 0.2, ["N_r"]), stated(0.9, 0.9)
     both = replace(sure, effects=[*unlikely.effects, *sure.effects])
     assert verdict_name(both, False, left_on()) == "found"
 
@@ -504,7 +504,7 @@ def test_set_holds_95_percent_of_the_weights_that_confidence_comes_from(weights,
 
 
 def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does_not():
-    found = told(0.99, 0.99)
+    found = stated(0.99, 0.99)
     (there,), (beside,) = (
         with_confidence(found, Model(), Doubts(unexplained_axes(found, left, Model()))).effects
         for left in (left_on(X=True), left_on(N=True))
@@ -674,7 +674,7 @@ def test_a_coefficient_is_no_second_part_of_its_own_change():
 @pytest.mark.parametrize(("own", "sure"), [(0.9, True), (0.01, False), (0.0, False), (None, True)])
 def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sure):
     """By shares of the first error; a method that cannot fit without it says nothing."""
-    found, start = told(0.99, 0.99), Model()
+    found, start = stated(0.99, 0.99), Model()
     doubts = Doubts(replaceable=replaceable(found, [0.9], [own], 0.5))
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)

@@ -438,7 +438,7 @@ def test_one_function_in_one_file_adds_an_effect_to_the_fmu(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "stated"),
     [
         (OWN.format(body="N_uuv if ship.u > 0.0 else 0.0"), "mine.py:8"),
         (OWN.format(body=GOOD).replace("N_uuv", "delta_X_u"), "effect 'X_u' already"),
@@ -450,11 +450,11 @@ def test_one_function_in_one_file_adds_an_effect_to_the_fmu(tmp_path):
         ("import nowhere_at_all", "nowhere_at_all"),
     ],
 )
-def test_a_wrong_file_of_effects_is_told_in_one_line(tmp_path, text, told):
+def test_a_wrong_file_of_effects_is_told_in_one_line(tmp_path, text, stated):
     (tmp_path / "mine.py").write_text(text)
     done = command("fmus.build", "vessel", "--effects", "mine.py", "--out", "fmu", cwd=tmp_path)
     assert done.returncode == 2
-    assert told in done.stderr
+    assert stated in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.glob("fmu/*"))
 

@@ -75,10 +75,10 @@ def agreed(folder):
     """Summary of a campaign whose journal and table hold the same runs."""
     lines = (folder / JOURNAL).read_text().splitlines()
     made = pandas.read_parquet(folder / TABLE)
-    told = json.loads((folder / SUMMARY).read_text())
+    stated = json.loads((folder / SUMMARY).read_text())
     assert {json.loads(line)["hash"] for line in lines} == set(made["hash"])
-    assert len(made) == told["done"] + told["failed"]
-    return told
+    assert len(made) == stated["done"] + stated["failed"]
+    return stated
 
 
 @linux_only
@@ -91,9 +91,9 @@ def test_fmu_that_exits_with_0_is_no_success_of_a_campaign(runs, tmp_path):
     assert lines[0].startswith(
         "error: ramp: the simulating process died in a step (exit code 0); 2 of 4"
     )
-    told = agreed(tmp_path / "out")
-    assert (told["status"], told["done"], told["runs"]) == ("failed", 2, 4)
-    assert "exit code 0" in told["message"]
+    stated = agreed(tmp_path / "out")
+    assert (stated["status"], stated["done"], stated["runs"]) == ("failed", 2, 4)
+    assert "exit code 0" in stated["message"]
 
 
 @linux_only
@@ -141,8 +141,8 @@ def test_a_campaign_says_that_it_runs_and_that_it_was_interrupted(runs, tmp_path
     code, lines = ended(process)  # how quickly is a matter of benchmarks.reliability
     assert (code, len(lines)) == (130, 1), lines
     assert lines[0].startswith("interrupted: ")
-    told = json.loads((out / SUMMARY).read_text())
-    assert (told["status"], told["done"]) == ("interrupted", 1)
+    stated = json.loads((out / SUMMARY).read_text())
+    assert (stated["status"], stated["done"]) == ("interrupted", 1)
     assert list(pandas.read_parquet(out / TABLE)["k"]) == [1.0]
 
 
@@ -194,10 +194,10 @@ def test_journal_and_table_agree_on_a_full_disk(what, runs, tmp_path, monkeypatc
     monkeypatch.setattr(place, full)
     with pytest.raises(cosim.SimulationError, match="No space left on device"):
         cosim.run_campaign(runs([1.0, 2.0, 3.0, 4.0, 5.0]), tmp_path / "out", workers=0)
-    told = agreed(tmp_path / "out")
-    assert told["status"] == "failed"
-    assert "No space left" in told["message"]
-    assert told["done"] == (3 if what == "journal" else 2)
+    stated = agreed(tmp_path / "out")
+    assert stated["status"] == "failed"
+    assert "No space left" in stated["message"]
+    assert stated["done"] == (3 if what == "journal" else 2)
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_values_beyond_a_range_are_its_end_and_the_set_gives_the_others(base):
         'version="1.0" name="more"><ssv:Parameters><ssv:Parameter name="vessel.m"><ssv:Real '
         'value="20.0"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
     )
-    told = []
+    stated = []
     made = run_ensemble(
         load_scenario(base / "base.json"),
         base / "posterior.json",
@@ -97,10 +97,10 @@ def test_values_beyond_a_range_are_its_end_and_the_set_gives_the_others(base):
         base / "out",
         [base / "more.ssv"],
         workers=0,
-        show=told.append,
+        show=stated.append,
     )
     assert (made["thrusters.plant_F_vsp"] >= 0.0).all()
-    assert any("plant_F_vsp are clipped to its range" in line for line in told)
+    assert any("plant_F_vsp are clipped to its range" in line for line in stated)
     ran = json.loads((base / "out" / "campaign.json").read_text())["scenario"]
     assert ran["fmus"]["vessel"]["parameters"]["m"] == 20.0
 

@@ -412,8 +412,8 @@ def test_derivatives_of_the_fmu_are_those_of_differences(work, monkeypatch, prov
     described = re.sub("<ModelStructure>.*</ModelStructure>", CUBIC_STRUCTURE, described)
     monkeypatch.setattr(foreign, "SOURCE", source)
     monkeypatch.setattr(foreign, "DESCRIPTION", described)
-    told = f'{foreign.ANY_STEP} providesDirectionalDerivative="{str(provided).lower()}"'
-    model = FmuModel(foreign.build_lag(work, capabilities=told))
+    stated = f'{foreign.ANY_STEP} providesDirectionalDerivative="{str(provided).lower()}"'
+    model = FmuModel(foreign.build_lag(work, capabilities=stated))
     at = {"out, filtered": 0.7, "in[1]": 0.2, "T": 2.0}
     states = states_of(model, None)
     given = {"outputs": {"y": "out, filtered"}, "start": {"y": "out, filtered"}}
@@ -479,9 +479,9 @@ def test_parameters_without_runs(fmu, work, capsys):
     assert parameters.main([str(fmu)]) == 0
     names = [p["name"] for p in json.loads((work / "parameters.json").read_text())["parameters"]]
     assert names == ["m", "c", "d", "unused"]
-    told = " ".join(capsys.readouterr().out.split())
-    assert told.count("left out: ") == told.count("; a value of 0 without a range has no scale") == 1
-    assert "c3" in told.partition("left out: ")[2]
+    stated = " ".join(capsys.readouterr().out.split())
+    assert stated.count("left out: ") == stated.count("; a value of 0 without a range has no scale") == 1
+    assert "c3" in stated.partition("left out: ")[2]
     assert parameters.main([str(fmu)]) == 2
     assert "--overwrite" in capsys.readouterr().err
 

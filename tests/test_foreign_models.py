@@ -202,9 +202,9 @@ def test_the_command_writes_comparison_report_and_map(folder, csv, tmp_path, nom
     command = [csv, "--model", str(folder / "vessel.fmu"), "--out", str(out)]
     assert compare.main(command) == 0
     content = json.loads((out / "comparison.json").read_text())
-    (told,) = content["errors"]
-    assert told["window_position_rmse"]["before"] == pytest.approx(nominal[0], rel=1e-3)
-    assert max(told["omega_rms"]["before"]) < 0.01
+    (stated,) = content["errors"]
+    assert stated["window_position_rmse"]["before"] == pytest.approx(nominal[0], rel=1e-3)
+    assert max(stated["omega_rms"]["before"]) < 0.01
     assert len(content["where"]["sentences"]) == 3
     assert content["fmu"]["map"]["outputs"]["x"] == "x"
     assert "starts from the measured state" in (out / "report.html").read_text()
@@ -298,7 +298,7 @@ def test_names_and_units_that_an_fmu_declares_are_matched():
         "x": "x", "y": {"name": "west", "flip": True}, "psi": "ship.heading", "u": None, "v": None, "r": None,
     }  # fmt: skip
     found = completed(proposed, model, commands, "map")
-    assert {s: c.name for s, c in found.told("start").items()} == {"u": "start_u"}
+    assert {s: c.name for s, c in found.stated("start").items()} == {"u": "start_u"}
     lines = signal_lines(found, commands)
     for group, signal, own, si in (
         ("outputs", "psi", 90.0, np.pi / 2.0),
@@ -377,8 +377,8 @@ def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
 def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, tmp_path):
     model = mapped(folder, "vessel.fmu", tmp_path, inputs={"tau_Y": "tau_Y"}, outputs=SAME, start=BEGUN)
     predictor = model.on(runs)
-    (told,) = predictor.write(tmp_path, predictor.model.plus({"delta_X_u": -2.0}), runs)
-    assert "it needs tau_X or u_dot, which the map names under 'disturbance_inputs'" in told
+    (stated,) = predictor.write(tmp_path, predictor.model.plus({"delta_X_u": -2.0}), runs)
+    assert "it needs tau_X or u_dot, which the map names under 'disturbance_inputs'" in stated
     assert not (tmp_path / "found.fmu").exists()
 
 

@@ -18,8 +18,8 @@ DEG = np.pi / 180.0
 
 
 def variable(name, causality, unit=None, low=None, high=None, start=None):
-    told = None if unit is None else Unit(unit)
-    return FmuVariable(name, "Real", 0, causality, "continuous", told, "", low, high, start)
+    stated = None if unit is None else Unit(unit)
+    return FmuVariable(name, "Real", 0, causality, "continuous", stated, "", low, high, start)
 
 
 def fmu(*variables):

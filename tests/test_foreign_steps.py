@@ -215,10 +215,10 @@ def test_what_needs_a_tool_and_what_confines_it_is_said(made, tmp_path):
     change = ('needsExecutionTool="false"', 'needsExecutionTool="true"')
     needs = described(made, tmp_path / "needs.fmu", change)
     _, found = steps_of(needs, tmp_path)
-    told = found.predictor.description()
-    assert any("needsExecutionTool" in s for s in told.sentences)
-    assert told.confinement == found.predictor.confinement
-    assert "own process in an empty folder" in told.confinement
+    stated = found.predictor.description()
+    assert any("needsExecutionTool" in s for s in stated.sentences)
+    assert stated.confinement == found.predictor.confinement
+    assert "own process in an empty folder" in stated.confinement
     _, free = steps_of(made, tmp_path, confined=False)
     assert free.predictor.confinement.startswith("unconfined: ")
 
@@ -287,8 +287,8 @@ def test_a_run_that_is_not_of_the_default_ship_asks_for_the_ship(made, tmp_path,
     header = "time,x,y,psi,tau_X,tau_Y,tau_N"
     np.savetxt("run.csv", table, delimiter=",", header=header, comments="")
     assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 2
-    told = " ".join(capsys.readouterr().err.split())
-    assert "of 1.105 m? --ship NAME|FILE.toml selects it" in told
+    stated = " ".join(capsys.readouterr().err.split())
+    assert "of 1.105 m? --ship NAME|FILE.toml selects it" in stated
     assert not (tmp_path / "out").exists()
 
 

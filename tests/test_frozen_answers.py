@@ -41,7 +41,7 @@ def test_an_answer_is_the_same_as_itself_within_the_tolerance():
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "stated"),
     [
         ({"verdict": "none"}, "verdict: found -> none"),
         ({"effects": []}, "effects: X_u -> "),
@@ -52,8 +52,8 @@ def test_an_answer_is_the_same_as_itself_within_the_tolerance():
         ),
     ],
 )
-def test_what_a_user_reads_first_is_reported_apart(content, told):
-    assert told in differences(ANSWER, changed(**content)).notable
+def test_what_a_user_reads_first_is_reported_apart(content, stated):
+    assert stated in differences(ANSWER, changed(**content)).notable
 
 
 def test_a_small_change_of_confidence_differs_but_is_not_reported_apart():

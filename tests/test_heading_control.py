@@ -31,7 +31,7 @@ H = 0.02
 NO_TURN = {"integral": 0.0, "N_absr_r": 0.0, "length": 1.0, "u_least": 1.0}
 
 
-def nomoto(psi_t, seconds, off=0.0, told=lambda N: N, **values):
+def nomoto(psi_t, seconds, off=0.0, stated=lambda N: N, **values):
     """Heading off the reference at the start; rows of (psi, r, psi_d, r_d, tau_N) at steps of H."""
     p = with_values(HEADING, **{**NO_TURN, **values})
     m, d = mass_matrix(p.inertia)[2][2], -p.damping.N_r
@@ -41,7 +41,7 @@ def nomoto(psi_t, seconds, off=0.0, told=lambda N: N, **values):
     for _ in range(round(seconds / H)):
         applied = Applied(0.0, 0.0, acting)
         s, out = HEADING.step(s, Inputs(Estimate(psi_hat=psi, r_hat=r), target, applied), p, H)
-        acting = told(out.demand.tau.tau_N)
+        acting = stated(out.demand.tau.tau_N)
         rows.append((psi, r, out.psi_d, out.r_d, out.demand.tau.tau_N))
         decay = math.exp(-d / m * H)
         steady = acting / d
@@ -90,14 +90,14 @@ def test_the_heading_takes_the_shorter_way():
 
 
 def test_a_moment_that_the_thrusters_do_not_give_is_not_wound_up():
-    def asked_by(told):
-        return nomoto(0.5, 400.0, told=told, integral=0.1)[-1]
+    def asked_by(stated):
+        return nomoto(0.5, 400.0, stated=stated, integral=0.1)[-1]
 
     K_P = mass_matrix(HEADING.params().inertia)[2][2] * HEADING.params().omega_psi_prime ** 2
     helpless = asked_by(lambda N: 0.0)
     assert helpless[-1] == pytest.approx(0.1 * K_P * 0.5, rel=0.01)
     limit = 0.02
-    psi = nomoto(0.5, 400.0, told=lambda N: float(np.clip(N, -limit, limit)), integral=0.1)[0]
+    psi = nomoto(0.5, 400.0, stated=lambda N: float(np.clip(N, -limit, limit)), integral=0.1)[0]
     assert psi.max() < 0.55
     assert psi[-1] == pytest.approx(0.5, abs=1e-3)
 
@@ -115,8 +115,8 @@ def test_force_and_moment_that_the_model_lacks_are_told_once_the_ship_is_steady(
         drag = (c.X_u + c.X_absu_u * abs(u) + c.X_uuu * u * u) * u
         u, r = u + h * (tau.tau_X + drag + 0.2) / m_u, r + h * (tau.tau_N + c.N_r * r - 0.05) / m_r
         psi += h * r
-    told = out.demand
-    assert (told.omega_hat_X, told.omega_hat_Y, told.omega_hat_N) == pytest.approx(
+    stated = out.demand
+    assert (stated.omega_hat_X, stated.omega_hat_Y, stated.omega_hat_N) == pytest.approx(
         (0.2, 0.0, -0.05), rel=1e-3
     )
     assert (u, psi) == pytest.approx((0.2, 0.0), abs=1e-4)
@@ -241,19 +241,19 @@ def voyage(d, seconds, legs, mirrored=False, current=(0.0, 0.0), **values):
     hull = vessel.prepared(with_values(vessel, V_n=flow[0], V_e=flow[1]))
     drive = thrusters.prepared(thrusters.params())
     state = vessel.init(None, vessel.params())._replace(x=0.0, y=0.0, psi=0.0, u=0.4 * at.speed)
-    past, gs, cs, told, rows = thrusters.init(None, thrusters.params()), None, None, None, []
+    past, gs, cs, stated, rows = thrusters.init(None, thrusters.params()), None, None, None, []
     h = 0.1 * at.time
     for _ in range(round(seconds / 0.1)):
         e = Estimate(state.x, state.y, state.psi, state.u, state.v, state.r)
         gs = gs or guidance.init(guidance.inputs(e), g)
         gs, aim = guidance.step(gs, guidance.inputs(e), g, h)
-        i = controller.inputs(e, aim.target, told or controller.inputs().applied)
+        i = controller.inputs(e, aim.target, stated or controller.inputs().applied)
         cs = cs or controller.init(i, c)
         cs, out = controller.step(cs, i, c, h)
         assert out.demand.tau.tau_Y == 0.0
         nu = VelocityInCurrent(state.u, state.v, state.r, *water_velocity(state, hull))
         past, acts = thrusters.advance(past, thrusters.inputs(out.demand.tau, nu), drive, h)
-        told = Applied(acts.tau_cmd_X, acts.tau_cmd_Y, acts.tau_cmd_N)
+        stated = Applied(acts.tau_cmd_X, acts.tau_cmd_Y, acts.tau_cmd_N)
         tau = Force(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N)
         state, _ = vessel.advance(state, tau, hull, h)
         rows.append((state.x / at.length, side * state.y / at.length, side * state.psi,

@@ -378,13 +378,13 @@ def problem_of(effect, coefficients="exact", values=None, alike=((),)):
 
 def answer_of(verdict, *effects, significant=False, suspects=()):
     """An answer with effects (id, confidence, coefficients)."""
-    told = [
+    stated = [
         {"id": e, "confidence": c, "indistinguishable": [], "coefficients": k} for e, c, k in effects
     ]
     error = {"held_out": True, "window_position_rmse": {"before": 0.1, "after": 0.01}}
     return {
         "verdict": verdict,
-        "effects": told,
+        "effects": stated,
         "suspect_coefficients": [{"name": n} for n in suspects],
         "remainder": {"significant": significant},
         "errors": [error],
@@ -419,11 +419,11 @@ def test_damping_of_one_ship_counts_as_one():
     """Its coefficients are off together: three of each say no more than one, and the error stays."""
     off = np.random.default_rng(2).standard_normal(12)
 
-    def told(of_each):
+    def stated(of_each):
         return bias([Row("N_r", "n1", "wrong", 0, damping=[str(z)] * of_each) for z in off])
 
-    assert told(1) == told(3)
-    assert told(1).endswith("(12 ships)")
+    assert stated(1) == stated(3)
+    assert stated(1).endswith("(12 ships)")
     assert mean_and_error([-1.0, 1.0]) == pytest.approx((0.0, 1.0))
     assert mean_and_error(4 * [2.0]) == pytest.approx((2.0, 0.0))
 
@@ -445,9 +445,9 @@ def test_coefficient_that_is_told_counts_where_it_is_the_same_as_the_effect():
     assert same_coefficients("X_|u|u") == {"X_absu_u"}
     assert same_coefficients("loss_bow") == {"plant_F_bow"}
     assert same_coefficients("X_rr") == same_coefficients("current") == set(), "nominally zero"
-    told = answer_of("coefficients", suspects=["N_r"])
-    assert row(problem_of("N_r", "wrong"), told).right
-    assert not row(problem_of("Y_r", "wrong"), told).right
+    stated = answer_of("coefficients", suspects=["N_r"])
+    assert row(problem_of("N_r", "wrong"), stated).right
+    assert not row(problem_of("Y_r", "wrong"), stated).right
 
 
 @pytest.mark.parametrize("effect", UNKNOWN)
@@ -464,13 +464,13 @@ def test_nothing_that_is_named_is_a_cause_of_foreign_physics(effect, tmp_path):
 
 def test_bins_hold_enough_and_cover_all():
     rng = np.random.default_rng(0)
-    told = [Told(float(c), bool(rng.random() < c)) for c in rng.beta(4.0, 0.5, 700)]
-    found = bins(told)
+    stated = [Told(float(c), bool(rng.random() < c)) for c in rng.beta(4.0, 0.5, 700)]
+    found = bins(stated)
     assert len(found) > 3
     assert sum(b.count for b in found) == 700
     assert min(b.count for b in found) >= 50
     assert sum(b.calibrated for b in found) >= len(found) - 1
-    assert len(bins(told[:30])) == 1
+    assert len(bins(stated[:30])) == 1
 
 
 @pytest.mark.parametrize(
@@ -544,15 +544,15 @@ def test_outages_at_other_times_in_each_run_are_scored_run_by_run(effect):
     own = [tuple(drawn.during(f"run{k}").values.values()) for k in (1, 2, 3, 4)]
     assert len(set(own)) == 4
     assert drawn.size > 0.1
-    told = {
+    stated = {
         name.removesuffix("@run1"): {"value": t + 0.3, "ci95": [t + 0.2, t + 0.4], "run": name[-4:]}
         for name, t in drawn.values.items()
         if not name.endswith("run4")
     }
     problem = Problem(effect, "n1", "exact", 1, [drawn])
-    answer = answer_of("found", (effect.removesuffix(OTHER_TIMES), 0.98, told))
+    answer = answer_of("found", (effect.removesuffix(OTHER_TIMES), 0.98, stated))
     assert row(problem, answer).right
-    (name, one), *_ = told.items()
+    (name, one), *_ = stated.items()
     late = {"value": one["value"] + 1.0, "ci95": [one["value"] + 0.9, one["value"] + 1.1]}
-    for wrong in (told | {name: one | late}, {n: c for n, c in told.items() if c["run"] != "run2"}):
+    for wrong in (stated | {name: one | late}, {n: c for n, c in stated.items() if c["run"] != "run2"}):
         assert not row(problem, answer_of("found", (effect.split()[0], 0.98, wrong))).right

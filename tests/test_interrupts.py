@@ -148,14 +148,14 @@ def test_what_a_killed_call_has_left_goes_with_the_next_one(tmp_path, capsys):
         (usual / name / "files" / "report.html").write_text("half")
     assert default_folder(usual, {"run.csv": "hash"}) == usual.with_name("comparison_2")  # of others
     assert {p.name for p in usual.iterdir()} == {f".new-{os.getpid()}_b", ".new-mine"}
-    told = "note: removed 1 unfinished result(s) of killed calls from"
-    assert capsys.readouterr().err.startswith(f"{told} '{usual}'")
+    stated = "note: removed 1 unfinished result(s) of killed calls from"
+    assert capsys.readouterr().err.startswith(f"{stated} '{usual}'")
     (usual / f".new-{gone()}_c").mkdir()
     clean(usual)
     with together(usual, ["file"]) as new:
         (new / "file").write_text("x")
     assert {p.name for p in usual.iterdir()} == {f".new-{os.getpid()}_b", ".new-mine", "file"}
-    assert told in capsys.readouterr().err
+    assert stated in capsys.readouterr().err
 
 
 def test_a_folder_with_what_a_killed_call_has_left_alone_is_free(tmp_path):

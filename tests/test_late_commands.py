@@ -74,9 +74,9 @@ def test_late_commands_are_reported_together_with_the_line_that_mends_them(tmp_p
     assert line.startswith(
         f"{' and '.join(names)}: probably logged 0.4 s late (odds more than 10^6 : 1)"
     )
-    told = json.loads(line[line.index("put ") + 4 : line.rindex(" into ")])
-    assert told["columns"].keys() == {*names}
-    path.with_name("a.csv.json").write_text(json.dumps(told))
+    stated = json.loads(line[line.index("put ") + 4 : line.rindex(" into ")])
+    assert stated["columns"].keys() == {*names}
+    path.with_name("a.csv.json").write_text(json.dumps(stated))
     (mended,) = gather([path])
     assert not any(" late (odds" in note for note in mended.smoothed.notes)
     given = made()[["tau_X", "tau_Y", "tau_N"]].to_numpy()

@@ -585,9 +585,9 @@ def test_a_demand_beyond_the_limit_of_an_actuator_is_a_command(
     np.testing.assert_allclose(run.commanded["port.n"], own["port.n"])
 
 
-@pytest.mark.parametrize(("ratio", "told"), [(1.04, False), (1.9, True)])
+@pytest.mark.parametrize(("ratio", "stated"), [(1.04, False), (1.9, True)])
 def test_commands_that_are_often_beyond_their_limits_are_told(
-    tmp_path: Path, ratio: float, told: bool
+    tmp_path: Path, ratio: float, stated: bool
 ) -> None:
     """As where a log has the speed of the engine, and a gear is behind it."""
     own = {"port.n": np.where(TIME > 30.0, ratio * 16.541, 5.0), "starboard.n": np.full(TIME.size, 4.0)}
@@ -596,7 +596,7 @@ def test_commands_that_are_often_beyond_their_limits_are_told(
     share = f"{100.0 * (TIME > 30.0).mean():.0f} %"
     line = f"port.n is beyond its limit of 16.54 1/s in {share} of the rows, up to {ratio * 16.541:.4g}"
     assert [note for note in run.notes if note.startswith(line)] == list(run.notes)
-    assert bool(run.notes) is told
+    assert bool(run.notes) is stated
     np.testing.assert_allclose(run.commanded["port.n"], own["port.n"])
 
 

@@ -56,11 +56,11 @@ def nomoto(kind, seconds, T=5.0, K=0.1, U=1.0, drift=0.0, h=0.01, rate=None, **v
     for k in range(round(seconds / h)):
         inputs = guidance.inputs(psi) if kind == "zigzag" else guidance.inputs()
         s = s or guidance.init(inputs, p)
-        s, told = guidance.step(s, inputs, p, h)
-        rows.append((k * h, x, y, psi, told.order))
+        s, stated = guidance.step(s, inputs, p, h)
+        rows.append((k * h, x, y, psi, stated.order))
         bent = r if rate is None else rate(r)
         before = r
-        r += h * (K * told.order - bent) / T
+        r += h * (K * stated.order - bent) / T
         middle = psi + 0.25 * h * (before + r)
         x, y = x + h * U * math.cos(middle + drift), y + h * U * math.sin(middle + drift)
         psi += 0.5 * h * (before + r)
@@ -323,10 +323,10 @@ def conducted(d, kind, seconds, connect, held, mirrored=False, u=0.5, **values):
     for k in range(round(seconds / 0.1)):
         inputs = guidance.inputs(state.psi) if kind == "zigzag" else guidance.inputs()
         gs = gs or guidance.init(inputs, p)
-        gs, told = guidance.step(gs, inputs, p, h)
-        rows.append((k * h, state.x, state.y, state.psi, told.order))
+        gs, stated = guidance.step(gs, inputs, p, h)
+        rows.append((k * h, state.x, state.y, state.psi, stated.order))
         for output, names in connect.items():
-            asked |= dict.fromkeys(names, getattr(told, output))
+            asked |= dict.fromkeys(names, getattr(stated, output))
         asked |= {"u": state.u, "v": state.v, "r": state.r}
         past, acts = thrusters.advance(past, packer(thrusters.inputs)(list(asked.values())), drive, h)
         tau = Force(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N)
@@ -395,11 +395,11 @@ def conducted_stop(d, connect):
     state = vessel.init(None, vessel.params())._replace(x=0.0, y=0.0, psi=0.0, u=1.0)
     past, s, rows, h = thrusters.init(None, thrusters.params()), guidance.init(None, p), [], 0.05
     for k in range(600):
-        s, told = guidance.step(s, None, p, h)
-        rows.append((k * h, state.x, state.y, state.psi, told.order))
+        s, stated = guidance.step(s, None, p, h)
+        rows.append((k * h, state.x, state.y, state.psi, stated.order))
         i = thrusters.inputs()
         nu = VelocityInCurrent(state.u, state.v, state.r)
-        i = i._replace(request=i.request._replace(screw_n=told.n), velocity=nu)
+        i = i._replace(request=i.request._replace(screw_n=stated.n), velocity=nu)
         past, acts = thrusters.advance(past, i, drive, h)
         state, _ = vessel.advance(state, Force(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N), hull, h)
     return passage(*np.array(rows).T)
@@ -412,10 +412,10 @@ def test_the_page_has_the_measures_of_this_version(tmp_path):
     """The table of the first run, and the first overshoots by both orders of exchange."""
     page = (ROOT / "docs" / "trials.md").read_text(encoding="utf-8")
     block = page[page.index("measure            value") :].split("```")[0].splitlines()[1:-1]
-    told = {words[0]: words[1:3] for words in map(str.split, block)}
+    stated = {words[0]: words[1:3] for words in map(str.split, block)}
     found = cosim.simulate("otter_circle", tmp_path / "circle").metrics
-    degrees = {name for name, (_, unit) in told.items() if "°" in unit}
-    assert {name: value for name, (value, _) in told.items()} == {
+    degrees = {name for name, (_, unit) in stated.items() if "°" in unit}
+    assert {name: value for name, (value, _) in stated.items()} == {
         name: f"{math.degrees(x) if name in degrees else x:.4g}" for name, x in found.items()
     }
     row = page[page.index("| `otter_zigzag` |") :].splitlines()[0].replace("°", "").split("|")[2:6]
@@ -431,10 +431,10 @@ def test_the_page_has_the_measures_of_this_version(tmp_path):
 def test_a_run_is_measured_where_its_guidance_is_a_trial(name, names, tmp_path):
     result = cosim.simulate(name, tmp_path, pictures=True)
     assert (result.status, result.warnings) == ("done", [])
-    told = json.loads((tmp_path / "metrics.json").read_text())
-    assert names <= told.keys() <= {m.name for m in MEASURES}
+    stated = json.loads((tmp_path / "metrics.json").read_text())
+    assert names <= stated.keys() <= {m.name for m in MEASURES}
     sheet_ = json.loads((tmp_path / "trial.json").read_text())
-    assert sheet_["measures"] == told
+    assert sheet_["measures"] == stated
     assert sheet_["executes"][0] == pytest.approx(20.0)
     assert (tmp_path / "trial.png").exists()
     limited = json.loads((tmp_path / "log.json").read_text())["commands"]
@@ -444,7 +444,7 @@ def test_a_run_is_measured_where_its_guidance_is_a_trial(name, names, tmp_path):
     headers = [c.header for c in sheet(result.trial).columns]
     assert headers == ["measure", "value", "unit", "in L", "IMO limit", "meaning"]
     done = command(metrics_main, tmp_path, "--json")
-    assert json.loads(done.stdout) == pytest.approx(told, rel=1e-9)
+    assert json.loads(done.stdout) == pytest.approx(stated, rel=1e-9)
     assert "limit" in command(metrics_main, tmp_path).stdout
 
 

@@ -449,9 +449,9 @@ def test_log_does_not_write_into_a_file_that_took_its_place(tmp_path):
     other = os.open(tmp_path / "other", os.O_CREAT | os.O_WRONLY)
     os.dup2(other, writer._file.fileno())
     for _ in range(2):
-        with pytest.raises(OSError, match="another part of the program closed its file") as told:
+        with pytest.raises(OSError, match="another part of the program closed its file") as stated:
             writer.write(rows)
-        assert told.value.errno == errno.EBADF
+        assert stated.value.errno == errno.EBADF
     assert writer.rows == 1
     os.close(other)
     assert (tmp_path / "other").read_bytes() == b""

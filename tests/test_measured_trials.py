@@ -41,8 +41,8 @@ def as_file(sailed, kind, folder, trial: str | None = "same", noise=0.002, **oth
     table["psi"] = (table["psi"] + np.pi) % (2.0 * np.pi) - np.pi
     table = table.assign(**others)
     table.to_csv(folder / f"{kind}.csv", index=False)
-    told = kind if trial == "same" else trial
-    (folder / f"{kind}.csv.json").write_text(json.dumps({"trial": told}))
+    stated = kind if trial == "same" else trial
+    (folder / f"{kind}.csv.json").write_text(json.dumps({"trial": stated}))
     return folder / f"{kind}.csv"
 
 
@@ -72,22 +72,22 @@ def test_the_option_says_which_trial_and_which_part(sailed, tmp_path):
         trial_main, file, "--ship", "otter", "--trial", "circle", "--from", 10, "--to", 45, "--out", out
     )
     assert done.returncode == 0, done.stderr
-    told = json.loads((out / "trial.json").read_text())
-    assert told["executes"] == pytest.approx([20.0], abs=0.11)
-    assert "tactical_diameter" in told["measures"]
-    assert "circle_speed" not in told["measures"]
+    stated = json.loads((out / "trial.json").read_text())
+    assert stated["executes"] == pytest.approx([20.0], abs=0.11)
+    assert "tactical_diameter" in stated["measures"]
+    assert "circle_speed" not in stated["measures"]
 
 
 def test_a_part_without_an_approach_says_so(sailed, tmp_path):
     file = as_file(sailed, "circle", tmp_path)
-    told = []
+    stated = []
     for start in (0, 19.5):
         done = command(trial_main, file, "--ship", "otter", "--from", start, "--out", tmp_path / "out")
         assert done.returncode == 0, done.stderr
-        told.append("before the first execute: initial heading and speed need one" in done.stdout)
+        stated.append("before the first execute: initial heading and speed need one" in done.stdout)
         log = command(trial_main, sailed / "circle", "--from", start, "--out", tmp_path / "out")
-        told.append("before the first execute: initial heading and speed need one" in log.stdout)
-    assert told == [False, False, True, True]
+        stated.append("before the first execute: initial heading and speed need one" in log.stdout)
+    assert stated == [False, False, True, True]
 
 
 @pytest.mark.parametrize(("stop", "said"), [(45.0, False), (21.0, True)])
@@ -155,9 +155,9 @@ def test_compare_writes_them(sailed, tmp_path):
     file = as_file(sailed, "zigzag", tmp_path)
     done = command(compare_main, file, "--ship", "otter", "--out", tmp_path / "found")
     assert done.returncode == 0, done.stderr
-    told = json.loads((tmp_path / "found" / "comparison.json").read_text())["errors"][0]["trial"]
-    assert [len(triple) for triple in told["overshoot"]] == [3] * len(told["overshoot"])
-    assert len(told["check_angle"]) == 3
+    stated = json.loads((tmp_path / "found" / "comparison.json").read_text())["errors"][0]["trial"]
+    assert [len(triple) for triple in stated["overshoot"]] == [3] * len(stated["overshoot"])
+    assert len(stated["check_angle"]) == 3
     for page in (done.stdout, (tmp_path / "found" / "report.html").read_text(encoding="utf-8")):
         assert "Manoeuvring trials" in page
         assert "overshoot_1" in page
@@ -230,11 +230,11 @@ def test_a_log_with_a_wrong_clock_is_repaired_and_measured(tmp_path):
         part = "--from", start, "--to", stop, "--out", tmp_path / "out"
         done = command(trial_main, file, "--ship", "gunnerus", "--trial", "circle", *part)
         assert done.returncode == 0, done.stderr
-        told = json.loads((tmp_path / "out" / "trial.json").read_text())["measures"]
-        assert told["tactical_diameter"] == pytest.approx(92.3, abs=1.5)
-        assert told["transfer"] == pytest.approx(40.6, abs=1.5)
-        assert told["advance"] == pytest.approx(104.2, rel=0.06)
-        assert np.degrees(told["circle_rate"]) == pytest.approx(2.83, abs=0.1)
+        stated = json.loads((tmp_path / "out" / "trial.json").read_text())["measures"]
+        assert stated["tactical_diameter"] == pytest.approx(92.3, abs=1.5)
+        assert stated["transfer"] == pytest.approx(40.6, abs=1.5)
+        assert stated["advance"] == pytest.approx(104.2, rel=0.06)
+        assert np.degrees(stated["circle_rate"]) == pytest.approx(2.83, abs=0.1)
 
 
 @needs_data

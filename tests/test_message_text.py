@@ -70,11 +70,11 @@ def test_the_first_fault_says_where_and_what(content, says):
 
 @pytest.mark.parametrize("value", ["x" * 100_000, "x y " * 50_000, "\n\x1b[2J" * 10_000, "{0}" * 50_000])
 def test_values_are_cut_and_escaped(value):
-    told = brief(f"'{value}' is no law; there are 'a', 'b'")
-    quoted, _, rest = told[1:].partition("' ")
+    stated = brief(f"'{value}' is no law; there are 'a', 'b'")
+    quoted, _, rest = stated[1:].partition("' ")
     assert len(quoted) <= LONGEST_VALUE
     assert rest == "is no law; there are 'a', 'b'"
-    assert told.isprintable()
+    assert stated.isprintable()
     unquoted = brief(f"there is no law {value}")
     assert len(unquoted) <= LONGEST_FAULT
     assert unquoted.isprintable()

@@ -292,7 +292,7 @@ class TestPlots:
         from matplotlib.figure import Figure
 
         draw, drawn = Figure.draw, []
-        monkeypatch.setattr(Figure, "draw", lambda *told: (drawn.append(told[0]), draw(*told))[1])
+        monkeypatch.setattr(Figure, "draw", lambda *stated: (drawn.append(stated[0]), draw(*stated))[1])
         files = drawing.draw({"a": wild(1, 5000), "b": wild(2)}, tmp_path / "new")
         assert len(drawn) == len(set(drawn)) == len(self.ALL)
         assert self.names(files) == self.ALL
@@ -351,9 +351,9 @@ class TestPlots:
         log = wild() | {"thrusters.rudder_delta": np.radians(wild(2)["vessel.u"])}
         log["guidance.psi_t"] = log["vessel.psi"] + 2.0 * np.pi + 0.1
         limits = {"thrusters.rudder_delta": CommandLimit(-0.6, 0.5, "rad")}
-        told = {"a": RunOptions(commands=limits)}
+        stated = {"a": RunOptions(commands=limits)}
         assert "commands" not in dict(drawing.figures({"a": log}))
-        rudder, speed, heading = dict(drawing.figures({"a": log}, told))["commands"].axes
+        rudder, speed, heading = dict(drawing.figures({"a": log}, stated))["commands"].axes
         assert rudder.get_ylabel() == "rudder_delta [deg]"
         line, low, high, *_ = rudder.get_lines()
         assert line.get_ydata() == pytest.approx(wild(2)["vessel.u"])
@@ -365,7 +365,7 @@ class TestPlots:
         reached, wanted = heading.get_lines()
         assert wanted.get_ydata() - reached.get_ydata() == pytest.approx(np.degrees(0.1))
         without = {name: values for name, values in log.items() if not name.startswith("guidance.")}
-        *_, heading = dict(drawing.figures({"a": without}, told))["commands"].axes
+        *_, heading = dict(drawing.figures({"a": without}, stated))["commands"].axes
         assert len(heading.get_lines()) == 1
 
     def test_lost_thrust_is_part_of_the_model_error(self):
@@ -454,12 +454,12 @@ class TestPlots:
     def test_ships_are_drawn_apart_and_a_target_at_rest_is_a_cross(self):
         log = circle()
         log["guidance.x_t"], log["guidance.y_t"] = 0.0 * log["time"] + 1.0, 0.0 * log["time"] + 2.0
-        told = {
+        stated = {
             "a": RunOptions(
                 outline=ARROW._replace(length=0.3, corners=((0.2, 0.0), (-0.1, 0.05), (-0.1, -0.05)))
             )
         }
-        (_, figure), *_ = drawing.figures({"a": log}, told, names=("trajectory",))
+        (_, figure), *_ = drawing.figures({"a": log}, stated, names=("trajectory",))
         (panel,) = figure.axes
         (ships,) = panel.collections
         bows = np.array([path.vertices[0] for path in ships.get_paths()])
@@ -474,8 +474,8 @@ class TestPlots:
         start = drawn["start"]
         assert (start.get_xdata()[0], start.get_ydata()[0]) == (log["vessel.y"][0], log["vessel.x"][0])
         assert panel.get_title(loc="right") == f"ships drawn full length, every {20.0 / 11:.3g} s"
-        told = {"a": RunOptions(outline=ARROW)}
-        (_, figure), *_ = drawing.figures({"a": log}, told, names=("trajectory",))
+        stated = {"a": RunOptions(outline=ARROW)}
+        (_, figure), *_ = drawing.figures({"a": log}, stated, names=("trajectory",))
         assert figure.axes[0].get_title(loc="right").startswith("ships drawn 1:2, "), (
             "no longer than half of it"
         )

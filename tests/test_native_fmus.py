@@ -100,8 +100,8 @@ def test_same_log_from_native_and_from_python_fmus(native, tmp_path):
         done = command(run_scenario, tmp_path / f"{kind}.json", "--out", out, "--quiet", "--no-plots")
         assert done.returncode == 0, done.stderr
         logs.append((out / "log.csv").read_bytes())
-        told = json.loads((out / "log.json").read_text())["fmus"].values()
-        assert [entry["native"] for entry in told] == [kind == "native"] * 5
+        stated = json.loads((out / "log.json").read_text())["fmus"].values()
+        assert [entry["native"] for entry in stated] == [kind == "native"] * 5
     assert logs[0] == logs[1]
     assert logs[0].count(b"\n") == round(stop * 100) + 2
 

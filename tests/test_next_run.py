@@ -493,9 +493,9 @@ def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path, monkeypatch
     assert plan.inseparable == []
     files = plan.write(tmp_path)
     assert sorted(files) == sorted(p.name for p in tmp_path.iterdir())
-    told = json.loads((tmp_path / "next.json").read_text())
-    assert set(told) >= {"runs", "inseparable"}
-    assert set(told["runs"][0]) >= {"scenario", "commands", "minutes", "sure"}
+    stated = json.loads((tmp_path / "next.json").read_text())
+    assert set(stated) >= {"runs", "inseparable"}
+    assert set(stated["runs"][0]) >= {"scenario", "commands", "minutes", "sure"}
     result = cosim.simulate(tmp_path / "scenario_1.json", tmp_path / "run", stop=10.0, pictures=False)
     assert result.status == "done"
     assert result.metrics["e_pos_max"] < 0.2
@@ -512,9 +512,9 @@ def test_without_a_posterior_the_advice_is_that_of_the_diagnosis(folder):
     done = command(design_run.main, folder, "--out", folder / "plan")
     assert done.returncode == 0
     assert "run astern" in done.stdout
-    told = json.loads((folder / "plan" / "next.json").read_text())
-    assert told["runs"] == []
-    assert told["advice"] == [content()["effects"][0]["advice"]]
+    stated = json.loads((folder / "plan" / "next.json").read_text())
+    assert stated["runs"] == []
+    assert stated["advice"] == [content()["effects"][0]["advice"]]
 
 
 @pytest.mark.parametrize(
@@ -556,8 +556,8 @@ def test_a_folder_without_a_diagnosis_is_named(tmp_path):
 
 
 def test_parameters_of_an_fmu_without_its_runs_are_refused(tmp_path):
-    told = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
-    (tmp_path / "diagnosis.json").write_text(json.dumps(told))
+    stated = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(stated))
     done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
     assert done.returncode == 2
     assert "learn again" in done.stderr
@@ -585,8 +585,8 @@ def test_inputs_of_an_fmu_are_designed_for_its_parameters(tmp_path):
     assert command(learn.main, tmp_path / "run.csv", *options).returncode == 0
     done = command(design_run.main, tmp_path / "d", "--minutes", "0.5", "--out", tmp_path / "plan")
     assert done.returncode == 0, done.stderr
-    told = json.loads((tmp_path / "plan" / "next.json").read_text())
-    assert told["runs"][0]["commands"] == "commands_1.csv"
+    stated = json.loads((tmp_path / "plan" / "next.json").read_text())
+    assert stated["runs"][0]["commands"] == "commands_1.csv"
     table = pd.read_csv(tmp_path / "plan" / "commands_1.csv")
     assert table["f"].between(1.0, 2.0).all()
     assert table["time"].iloc[-1] == pytest.approx(30.0, abs=0.1)
@@ -600,7 +600,7 @@ def test_inputs_of_an_fmu_are_designed_for_its_parameters(tmp_path):
     playback._fmu.close()
     J = np.column_stack(rows)
     std = np.sqrt(np.diag(np.linalg.inv(J.T @ J + np.eye(3))))
-    for row, s, value in zip(told["parameters"], std, true.values(), strict=True):
+    for row, s, value in zip(stated["parameters"], std, true.values(), strict=True):
         before, after = row["half_width"]
         assert after < before
         assert after == pytest.approx(1.96 * 0.3 * value * s, rel=0.3)

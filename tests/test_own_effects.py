@@ -231,14 +231,14 @@ def test_a_method_of_a_user_is_a_file_or_an_object(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "stated"),
     [(None, "no such"), ("METHOD = 3", "METHOD"), ("x = 1", "METHOD"), ("1 / 0", "ZeroDivisionError")],
 )
-def test_a_wrong_file_of_a_method_is_told(tmp_path, text, told):
+def test_a_wrong_file_of_a_method_is_told(tmp_path, text, stated):
     file = tmp_path / "mine.py"
     if text is not None:
         file.write_text(text)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=stated):
         method(str(file))
 
 

@@ -98,7 +98,7 @@ def test_values_of_one_run_come_back_as_its_own(always, tmp_path):
 
 def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
     path = tmp_path / "model.ssv"
-    for runs, told in (
+    for runs, stated in (
         (
             {"a": {"bow_failure_time": 40.0}},
             "bow_failure_time was found in run 'a' and holds for that run only",
@@ -114,7 +114,7 @@ def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
         short = cosim.load_scenario({**ellipse, "stop": 0.1})
         warnings = cosim.simulate(short, tmp_path / "out", [path], overwrite=True).warnings
         alone = [text for text in warnings if "for that run only" in text]
-        assert alone == [f"'{path}': thrusters.{told}"] * bool(told)
+        assert alone == [f"'{path}': thrusters.{stated}"] * bool(stated)
         assert read_starts(path).runs == [*runs], "which fmus.build tells"
 
 

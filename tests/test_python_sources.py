@@ -53,8 +53,8 @@ def test_units_in_the_names_of_columns_count_beside_a_side_car_that_has_others(r
     (found,) = diagnosis.load(tmp_path / "run.csv")
     np.testing.assert_allclose(found.run.pose, run.pose, rtol=1e-9, atol=1e-12)
     # What the side-car says of a column itself stands.
-    told = '{"columns": {"psi": "heading", "x": {"name": "x [mm]", "factor": 0.002}}}'
-    (tmp_path / "run.csv.json").write_text(told)
+    stated = '{"columns": {"psi": "heading", "x": {"name": "x [mm]", "factor": 0.002}}}'
+    (tmp_path / "run.csv.json").write_text(stated)
     (found,) = diagnosis.load(tmp_path / "run.csv")
     np.testing.assert_allclose(found.run.pose[:, 0], 2.0 * run.pose[:, 0], rtol=1e-9, atol=1e-12)
 
@@ -93,10 +93,10 @@ def test_options_of_the_command_are_those_of_the_function(tmp_path):
 def test_shipped_parameter_sets_are_known_by_name(tmp_path):
     for name in ("sysid4", "sysid4.ssv"):
         run = cosim.simulate("ellipse", stop=0.5, parameters=name, out=tmp_path / "out")
-        told = json.loads((run.folder / "log.json").read_text())["scenario"]["fmus"]["vessel"][
+        stated = json.loads((run.folder / "log.json").read_text())["scenario"]["fmus"]["vessel"][
             "parameters"
         ]
-        assert any(name.startswith("delta_") for name in told)
+        assert any(name.startswith("delta_") for name in stated)
     with pytest.raises(cosim.InputError, match="did you mean 'sysid4'"):
         cosim.simulate("ellipse", parameters="sysid_4.ssv")
 

@@ -122,6 +122,6 @@ def test_an_fmu_that_looks_for_the_measurement_is_said_in_the_record(run, tmp_pa
         assert j.outcome != "met"
         return
     assert j.outcome == "met", "it plays the run back"
-    told = " ".join(lines(v.content))
-    assert "unconfined" in told
-    assert sys.platform != "linux" or f"files outside of its own: {run}" in told
+    stated = " ".join(lines(v.content))
+    assert "unconfined" in stated
+    assert sys.platform != "linux" or f"files outside of its own: {run}" in stated

@@ -59,17 +59,17 @@ def test_recorded_input_beats_its_connection_where_there_is_a_value(chain, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("inputs", "told"),
+    ("inputs", "stated"),
     [
         ({"nobody.x": "a"}, "no instance 'nobody'"),
         ({"INPUT": "c"}, "no column 'c'"),
         ({"OUTPUT": "a"}, "not an input"),
     ],
 )
-def test_bad_recordings_are_refused(chain, tmp_path, inputs, told):
+def test_bad_recordings_are_refused(chain, tmp_path, inputs, stated):
     source, target = chain["connections"][0]
     named = {k.replace("INPUT", target).replace("OUTPUT", source): c for k, c in inputs.items()}
-    with pytest.raises(cosim.InputError, match=told):
+    with pytest.raises(cosim.InputError, match=stated):
         prepare(cosim.load_scenario(recording(chain, tmp_path, **named)))
 
 

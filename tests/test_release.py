@@ -110,17 +110,17 @@ def project():
 
 
 def test_descriptions_of_the_release_agree():
-    told = project()
+    stated = project()
     zenodo = json.loads((ROOT / ".zenodo.json").read_text())
     cff = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     heading = re.search(r"^## (\S+), (\S+)$", (ROOT / "CHANGELOG.md").read_text(), re.M)
-    assert {told["version"], zenodo["version"], cff["version"]} == {heading[1]}
+    assert {stated["version"], zenodo["version"], cff["version"]} == {heading[1]}
     assert {zenodo["publication_date"], str(cff["date-released"])} == {heading[2]}
     assert date.fromisoformat(heading[2])
-    assert {zenodo["title"], cff["title"]} == {told["name"]}
+    assert {zenodo["title"], cff["title"]} == {stated["name"]}
     assert zenodo["license"] == cff["license"] == (ROOT / "LICENSE").read_text().split()[0]
-    assert zenodo["keywords"] == cff["keywords"] == told["keywords"]
-    names = [a["name"] for a in told["authors"]]
+    assert zenodo["keywords"] == cff["keywords"] == stated["keywords"]
+    names = [a["name"] for a in stated["authors"]]
     assert [c["name"] for c in zenodo["creators"]] == [a["name"] for a in cff["authors"]] == names
     assert zenodo["description"].startswith(cff["abstract"].strip())
 
@@ -147,7 +147,7 @@ def test_metadata_have_what_their_readers_need():
 def test_the_readme_has_a_sentence_of_each_extra_for_users():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     users = project["optional-dependencies"].keys() - {"dev", "benchmark", "docs"}
-    told = re.findall(r"^- `(\w+)`: .+\.$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
-    assert sorted(told) == sorted(users)
+    stated = re.findall(r"^- `(\w+)`: .+\.$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
+    assert sorted(stated) == sorted(users)
     assert len(users) <= 6
     assert {*EXTRAS.values()} <= users

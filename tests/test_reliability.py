@@ -63,11 +63,11 @@ def test_death_of_the_simulating_process_is_one_line_and_no_row_is_lost(plain_fm
     assert done.returncode == 3
     (line,) = [line for line in done.stderr.splitlines() if line.startswith("error")]
     assert line.startswith(f"error: bad: the simulating process died in a step ({DEATHS[death]})")
-    told = json.loads((tmp_path / "out" / "log.json").read_text())
-    assert told["status"] == "failed"
-    assert DEATHS[death] in told["message"]
+    stated = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert stated["status"] == "failed"
+    assert DEATHS[death] in stated["message"]
     time = cosim.read_log(tmp_path / "out")["time"]
-    assert told["rows"] == len(time) == 11
+    assert stated["rows"] == len(time) == 11
     assert np.allclose(time, np.arange(11) * 0.01)
 
 
@@ -82,8 +82,8 @@ def test_death_before_the_first_row_replaces_the_earlier_run(plain_fmu, tmp_path
     assert done.returncode == 3
     assert "bad: the simulating process died in its instantiation (exit code 0)" in done.stderr
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"log.json"}
-    told = json.loads((tmp_path / "out" / "log.json").read_text())
-    assert (told["status"], told["rows"], told["scenario"]["name"]) == ("failed", 0, "alone")
+    stated = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert (stated["status"], stated["rows"], stated["scenario"]["name"]) == ("failed", 0, "alone")
 
 
 @linux_only
@@ -130,12 +130,12 @@ def test_short_writes_lose_nothing_and_a_full_disk_leaves_whole_rows(
     log, cut = (path.read_bytes() for path in names)
     assert log.startswith(cut)
     assert cut.endswith(b"\n")
-    told = json.loads((tmp_path / "short" / "log.json").read_text())
-    assert told["rows"] == result.rows == cut.count(b"\n") - 1
-    assert told["status"] == result.status == ("done" if room > len(log) else "failed")
+    stated = json.loads((tmp_path / "short" / "log.json").read_text())
+    assert stated["rows"] == result.rows == cut.count(b"\n") - 1
+    assert stated["status"] == result.status == ("done" if room > len(log) else "failed")
     if room < len(log):
         assert 0 < result.rows < whole.rows
-        assert "No space left" in told["message"]
+        assert "No space left" in stated["message"]
 
 
 def test_status_is_written_though_no_new_file_can_be(ellipse, tmp_path, monkeypatch):
@@ -143,10 +143,10 @@ def test_status_is_written_though_no_new_file_can_be(ellipse, tmp_path, monkeypa
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(files, "write_json", full)
-    told = {"messages": ["x" * 9000], "message": "y" * 9000, "rows": 7, "status": "failed"}
+    stated = {"messages": ["x" * 9000], "message": "y" * 9000, "rows": 7, "status": "failed"}
     files.write_roomy_json(tmp_path / "log.json", {"scenario": ellipse, "status": "running"})
     size = (tmp_path / "log.json").stat().st_size
-    files.update_json(tmp_path / "log.json", {"scenario": ellipse}, told)
+    files.update_json(tmp_path / "log.json", {"scenario": ellipse}, stated)
     assert (tmp_path / "log.json").stat().st_size == size
     read = json.loads((tmp_path / "log.json").read_text())
     assert (read["scenario"], read["rows"], read["status"]) == (ellipse, 7, "failed")
@@ -233,8 +233,8 @@ def test_interrupt_while_metrics_are_computed_is_told_in_the_log(ellipse, tmp_pa
     monkeypatch.setattr("cosim.results.performance.compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
         cosim.simulate(cosim.load_scenario(ellipse | {"stop": 0.1}), tmp_path / "out")
-    told = json.loads((tmp_path / "out" / "log.json").read_text())
-    assert (told["status"], told["rows"]) == ("interrupted", 11)
+    stated = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert (stated["status"], stated["rows"]) == ("interrupted", 11)
     assert len(cosim.read_log(tmp_path / "out")["time"]) == 11
 
 

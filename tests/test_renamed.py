@@ -145,22 +145,22 @@ def test_an_old_value_is_read_with_a_warning(kind, place, old):
 @pytest.mark.parametrize("name", shipped_ships())
 def test_a_shipped_ship_under_the_old_names_is_the_same(name, tmp_path):
     text = find_ship(name).read_text(encoding="utf-8")
-    old, told = read(read_ship, tmp_path / f"{name}.toml", aged(text))
+    old, stated = read(read_ship, tmp_path / f"{name}.toml", aged(text))
     assert old == read_ship(name)
-    assert len(told) == 1
-    assert told[0].startswith(f"'{tmp_path / f'{name}.toml'}': '")
-    assert "'share' is now 'rel_std'" in told[0]
+    assert len(stated) == 1
+    assert stated[0].startswith(f"'{tmp_path / f'{name}.toml'}': '")
+    assert "'share' is now 'rel_std'" in stated[0]
 
 
 def test_every_old_name_of_a_ship_gives_the_same_description(tmp_path):
     new, none = read(read_ship, tmp_path / "new.toml", TUG)
-    old, told = read(read_ship, tmp_path / "old.toml", aged(TUG))
+    old, stated = read(read_ship, tmp_path / "old.toml", aged(TUG))
     assert none == []
     assert old == new
-    assert len(told) == 1
-    assert told[0].endswith("; the old names are read until version 2")
+    assert len(stated) == 1
+    assert stated[0].endswith("; the old names are read until version 2")
     for name in ("share", "order", "allocates", "force_table_ahead", "force_table_aside"):
-        assert f"'{name}' is now" in told[0]
+        assert f"'{name}' is now" in stated[0]
 
 
 @pytest.mark.parametrize(
@@ -180,10 +180,10 @@ def test_maps_and_criteria_under_the_old_names_are_the_same(reader, content, ren
     for new, old in renamed:
         aged_text = aged_text.replace(f'"{new}"', f'"{old}"')
     new, none = read(reader, tmp_path / "new.json", text)
-    old, told = read(reader, tmp_path / "old.json", aged_text)
+    old, stated = read(reader, tmp_path / "old.json", aged_text)
     assert none == []
     assert old == new
-    assert len(told) == 1
+    assert len(stated) == 1
     again, silent = read(reader, tmp_path / "old.json", aged_text)
     assert again == old
     assert silent == []  # one warning a file

@@ -230,14 +230,14 @@ def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("fate", "told"),
+    ("fate", "stated"),
     [
         ({}, "u reads 5 % too little"),
         ({"repaired": False}, "u reads 5 % too little (not repaired)"),
         ({"repaired": False, "aside": ("u", "v")}, "(not repaired; u and v not used)"),
     ],
 )
-def test_a_fault_of_a_channel_has_its_row(evaluations, tmp_path, fate, told):
+def test_a_fault_of_a_channel_has_its_row(evaluations, tmp_path, fate, stated):
     fault = SensorFinding("u", "scale", 0.95, "1", (0.9, 1.0), 0.0, 9.0, "u reads 5 % too little")
     first = evaluations[0]
     examined = replace(
@@ -245,7 +245,7 @@ def test_a_fault_of_a_channel_has_its_row(evaluations, tmp_path, fate, told):
     )
     faulty = replace(first, weak_windows=replace(first.weak_windows, smoothed=examined))
     page = write_report(tmp_path / "report.html", ReportData(compared([faulty]))).read_text("utf-8")
-    assert f"{told}</td>" in page
+    assert f"{stated}</td>" in page
 
 
 def test_nothing_half_written_stays(evaluations, tmp_path, monkeypatch):

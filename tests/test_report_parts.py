@@ -75,10 +75,10 @@ def test_test_runs_that_contradict_the_learned_model_are_told(before, after, lea
     trained = evaluation("a", 0.05, 0.01, held_out=False)
     tested = evaluation("b", before, after, held_out=True)
     r = SimpleNamespace(evaluations=[trained, tested], learned=learned)
-    told = [*headline.contradicted_by_tests(r)]
-    assert bool(told) == bool(said)
-    assert all("test run b" in sentence for sentence in told)
-    assert said in " ".join(told)
+    stated = [*headline.contradicted_by_tests(r)]
+    assert bool(stated) == bool(said)
+    assert all("test run b" in sentence for sentence in stated)
+    assert said in " ".join(stated)
     # Calibration alone may predict better where the initial model does not.
     tested.calibrated = evaluation("", 0.8 * after, 0.0, held_out=True).before.errors
     better = " ".join(headline.contradicted_by_tests(r))
@@ -99,12 +99,12 @@ def test_an_error_that_is_larger_by_chance_is_told_as_such(size, said):
     trained = evaluation("a", 0.05, 0.01, held_out=False)
     tested = evaluation("b", 0.05, 0.05, held_out=True)
     tested.after.errors.position[:] *= np.where(np.arange(10) == 3, size, 0.9)  # that of heading, too
-    told = [
+    stated = [
         *headline.contradicted_by_tests(SimpleNamespace(evaluations=[trained, tested], learned=True))
     ]
-    assert ("; of so few windows this may be chance." in told[0]) == said
+    assert ("; of so few windows this may be chance." in stated[0]) == said
     # Its cause is in the model, and not in the run, where another model predicts it better.
-    assert told[-1].endswith(f"{headline.LESS_BEYOND if said else headline.OTHER_RUN}.")
+    assert stated[-1].endswith(f"{headline.LESS_BEYOND if said else headline.OTHER_RUN}.")
 
 
 @pytest.mark.parametrize(
@@ -120,8 +120,8 @@ def test_a_run_that_constant_velocities_predict_better_is_told(model, steady, sa
     e.constant_velocities = evaluation("", steady, steady, held_out=False).before.errors
     unknown = SimpleNamespace(after=e.after, constant_velocities=None)
     r = SimpleNamespace(evaluations=[e, unknown], learned=False, called=lambda e: e.name)
-    told = [*headline.worse_than_constant_velocities(r)]
-    assert [sentence.partition(". ")[0] for sentence in told] == (
+    stated = [*headline.worse_than_constant_velocities(r)]
+    assert [sentence.partition(". ")[0] for sentence in stated] == (
         [f"The model predicts a worse than constant velocities do: {said}"] if said else []
     )
     r.learned = True

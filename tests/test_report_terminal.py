@@ -244,38 +244,38 @@ def test_what_is_hardly_possible_and_explains_little_has_one_line(confidence, sh
     assert "Possibility: unlikely" in shown
 
 
-@pytest.mark.parametrize(("heading", "told"), [(-2.1, True), (-1.9, False), (2.1, False)])
-def test_a_gain_in_position_that_costs_heading_says_so(heading, told):
+@pytest.mark.parametrize(("heading", "stated"), [(-2.1, True), (-1.9, False), (2.1, False)])
+def test_a_gain_in_position_that_costs_heading_says_so(heading, stated):
     better = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)
     other = PairedChange(0.01, 0.02, heading * 1e-5, 1e-5)
     gain = PredictionGain("validation runs", 54, better, other, True, "calibrated")
     said = " ".join(gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, 10.0))
     assert said.startswith(SEARCH_GAINED)
-    assert ("However, predictions of the heading are worse." in said) is told
+    assert ("However, predictions of the heading are worse." in said) is stated
     assert ("the mean square rises by 0.0" in said) is (heading < 0.0)
 
 
 @pytest.mark.parametrize(
-    ("times", "told"),
+    ("times", "stated"),
     [
         ((-2.1, -2.1), " Predictions of the position and the heading are worse."),
         ((-2.1, 1.0), " Predictions of the position are worse."),
         ((-1.9, -1.9), ""),
     ],
 )
-def test_a_model_that_predicts_worse_is_said_to(times, told):
+def test_a_model_that_predicts_worse_is_said_to(times, stated):
     changes = [PairedChange(0.01, 0.02, x * 1e-5, 1e-5) for x in times]
     gain = PredictionGain("validation runs", 54, *changes, False)
     said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, 10.0)
-    assert " ".join(said).startswith(f"{SEARCH_GAINED_NOTHING}{told} Predictions over 10 s in 54")
+    assert " ".join(said).startswith(f"{SEARCH_GAINED_NOTHING}{stated} Predictions over 10 s in 54")
 
 
 @pytest.mark.parametrize("driven", [(), ("surge",)])
 def test_a_hull_that_gains_energy_is_in_the_headline(driven):
     stability = SimpleNamespace(**vars(STABILITY) | {"driven_on": driven})
-    told = first_sentences(found(stability=stability))
-    assert told.startswith(first_sentences(found()))
-    assert ("In surge the hull of the learned model gains energy" in told) == bool(driven)
+    stated = first_sentences(found(stability=stability))
+    assert stated.startswith(first_sentences(found()))
+    assert ("In surge the hull of the learned model gains energy" in stated) == bool(driven)
 
 
 @pytest.mark.parametrize("gained", [True, False])
@@ -317,13 +317,13 @@ def test_a_report_says_how_commands_are_read_where_files_do_not():
 
 
 @pytest.mark.parametrize(
-    ("refitted", "now", "told"), [(True, 0.02, True), (True, 0.03, False), (False, 0.02, False)]
+    ("refitted", "now", "stated"), [(True, 0.02, True), (True, 0.03, False), (False, 0.02, False)]
 )
-def test_a_search_without_an_effect_says_why_its_numbers_differ(refitted, now, told):
+def test_a_search_without_an_effect_says_why_its_numbers_differ(refitted, now, stated):
     change = PairedChange(0.03, now, 0.03**2 - now**2, 1e-4)
     gain = PredictionGain("validation runs", 54, change, change, False, "calibrated")
     shown = " ".join(lines(show_diagnosis(found(gain=gain, refitted=refitted), "out")))
-    assert (OTHER_FIT in shown) is told
+    assert (OTHER_FIT in shown) is stated
 
 
 def test_a_calibrated_model_says_that_it_is_another_calibration():
@@ -388,7 +388,7 @@ def test_where_nothing_is_found_the_sentence_is_the_finding():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "stated"),
     [
         (
             {"bounded": False},
@@ -403,10 +403,10 @@ def test_where_nothing_is_found_the_sentence_is_the_finding():
         ),
     ],
 )
-def test_stability_in_words(changes, told):
+def test_stability_in_words(changes, stated):
     made = found(stability=SimpleNamespace(**vars(STABILITY) | changes))
-    assert told in lines(show_diagnosis(made, "out"))
-    assert told not in lines(show_diagnosis(found(), "out"))
+    assert stated in lines(show_diagnosis(made, "out"))
+    assert stated not in lines(show_diagnosis(found(), "out"))
 
 
 def test_a_summary_has_ten_lines_at_the_most():

@@ -46,12 +46,12 @@ def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
 
 
 def test_metrics_are_told_before_anything_is_drawn(scenario, tmp_path, monkeypatch):
-    told = []
+    stated = []
     monkeypatch.setattr(
-        cosim.results.drawing, "draw", lambda *_: told.append(sys.stdout.getvalue()) or []
+        cosim.results.drawing, "draw", lambda *_: stated.append(sys.stdout.getvalue()) or []
     )
     done = command(scenario(), "--out", tmp_path / "out")
-    assert "e_pos_rms" in told[0]
+    assert "e_pos_rms" in stated[0]
     assert done.stdout.count("e_pos_rms") == 1
 
 
@@ -499,6 +499,6 @@ def test_a_file_in_set_is_relative_to_the_working_directory(ellipse, tmp_path, f
     )
     done = command(*arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    told = json.loads((tmp_path / "out" / "log.json").read_text())
-    assert told["seed"] == 3
-    assert told["fmus"]["controller"]["path"] == str(tmp_path / "mine.fmu")
+    stated = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert stated["seed"] == 3
+    assert stated["fmus"]["controller"]["path"] == str(tmp_path / "mine.fmu")

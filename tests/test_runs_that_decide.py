@@ -47,7 +47,7 @@ def later(seed, t):
 def test_another_test_run_changes_nothing_that_is_learned(tmp_path):
     start, hidden = Model(), ({}, {"lag": 0.8}, OFF)
     train = measured(1, *hidden)
-    told = []
+    stated = []
     # Of the same ship, and of one without the effect whose file has the name of the training run.
     for test in (measured(2, *hidden), replace(measured(3), name="run 1")):
         runs = diagnosis.gather([train, test], model=start)
@@ -57,8 +57,8 @@ def test_another_test_run_changes_nothing_that_is_learned(tmp_path):
         said = json.loads(as_json(diagnosis_content(found, None, [])))
         assert [e["held_out"] for e in said["errors"]] == [False, True]
         files = [(tmp_path / n).read_bytes() for n in ("model.ssv", "posterior.json")]
-        told.append((files, {k: v for k, v in said.items() if k not in OF_RUNS}))
-    assert told[0] == told[1]
+        stated.append((files, {k: v for k, v in said.items() if k not in OF_RUNS}))
+    assert stated[0] == stated[1]
 
 
 def test_validation_runs_decide_what_is_kept():

@@ -55,7 +55,7 @@ def beside(run, **channels):
     return replace(run, measured=dict(run.measured) | channels)
 
 
-def told(run, scale=REFERENCE):
+def stated(run, scale=REFERENCE):
     return {(f.channel, f.kind): f for f in examine(run, scale).findings}
 
 
@@ -85,7 +85,7 @@ def test_a_constant_fault_is_named_with_its_size_and_repaired(name):
     found = examine(broken, REFERENCE)
     assert [(f.channel, f.kind) for f in found.findings] == [key]
     assert found.findings[0].value == pytest.approx(value, rel=0.1)
-    assert not told(found.run)
+    assert not stated(found.run)
     assert closure(found.run, 30.0, 10.0).position < 0.02
 
 
@@ -97,7 +97,9 @@ def test_an_error_that_goes_with_speed_and_course_is_no_scale_of_the_yaw_rate(tu
     """A gyrocompass errs by the speed to the north: nearly an offset on few headings, a cosine on all."""
     run = made(seed, turning)
     north = gaussian_filter1d(np.gradient(run.pose[:, 0], run.time), 10.0)
-    found = told(replace(run, pose=run.pose + np.column_stack([0.0 * north, 0.0 * north, -1.0 * north])))
+    found = stated(
+        replace(run, pose=run.pose + np.column_stack([0.0 * north, 0.0 * north, -1.0 * north]))
+    )
     assert named in found
     assert {channel for channel, _ in found} <= {"psi", "u"}
     assert {kind for channel, kind in found if channel == "psi"} == {named[1]}
@@ -108,15 +110,15 @@ def test_a_constant_of_half_of_the_run_has_the_uncertainty_of_its_parts():
     run = made()
     off = np.where(run.time > SECONDS / 2.0, 0.04, 0.0)
     broken = replace(run, pose=run.pose + np.column_stack([0.0 * off, 0.0 * off, off]))
-    assert ("psi", "offset") not in told(broken)
+    assert ("psi", "offset") not in stated(broken)
     whole = replace(run, pose=run.pose + np.array([0.0, 0.0, 0.04]))
-    fault = told(whole)["psi", "offset"]
+    fault = stated(whole)["psi", "offset"]
     assert fault.ci95[0] < 0.04 < fault.ci95[1]
     assert np.ptp(fault.ci95) < 0.02
 
 
 def test_a_unit_of_the_rate_is_named():
-    found = told(beside(made(), r=np.degrees(made().measured["r"])))
+    found = stated(beside(made(), r=np.degrees(made().measured["r"])))
     assert "deg/s in place of rad/s" in found["r", "scale"].sentence
 
 
@@ -141,7 +143,7 @@ def test_a_mirrored_channel_of_the_pose_is_named_not_the_three_that_contradict_i
     found = examine(replace(run, pose=run.pose * signs), REFERENCE)
     assert [(f.channel, f.kind, f.value) for f in found.findings] == [(name, "scale", -1.0)]
     np.testing.assert_array_equal(found.run.pose, run.pose)
-    assert [*told(beside(run, r=-run.measured["r"]))] == [("r", "scale")], "one that is alone is it"
+    assert [*stated(beside(run, r=-run.measured["r"]))] == [("r", "scale")], "one that is alone is it"
 
 
 def test_sway_with_the_other_sign_is_no_place_of_the_antenna():
@@ -158,7 +160,7 @@ def test_sway_with_the_other_sign_is_no_place_of_the_antenna():
 def test_a_delay_that_is_found_in_steps_is_stated_as_it_is_repaired(delay, way):
     run = made()
     u, v, r = (np.interp(run.time - delay, run.time, run.measured[name]) for name in "uvr")
-    found = told(beside(run, u=u, v=v, r=r))
+    found = stated(beside(run, u=u, v=v, r=r))
     for channel, name, of in (("u", "u and v are", "pose"), ("r", "r is", "heading")):
         value = abs(found[channel, "delay"].value)
         assert value == pytest.approx(0.5, abs=0.05)
@@ -168,7 +170,7 @@ def test_a_delay_that_is_found_in_steps_is_stated_as_it_is_repaired(delay, way):
 
 def test_a_scale_is_stated_in_percent():
     run = made()
-    found = told(beside(run, u=0.95 * run.measured["u"], v=0.95 * run.measured["v"]))
+    found = stated(beside(run, u=0.95 * run.measured["u"], v=0.95 * run.measured["v"]))
     assert found["u", "scale"].sentence.startswith("u and v are 5.0 % too small")
 
 
@@ -185,11 +187,11 @@ def swung(deviation=0.0, turning=0.06):
 
 
 def test_a_compass_off_by_heading_is_no_clock_that_wanders():
-    found = told(swung(0.07))
+    found = stated(swung(0.07))
     assert set(found) == {("psi", "deviation_sin"), ("psi", "deviation_cos_2")}
     assert found["psi", "deviation_sin"].value == pytest.approx(0.07, abs=0.004)
     assert found["psi", "deviation_cos_2"].value == pytest.approx(-0.035, abs=0.004)
-    assert not told(swung())
+    assert not stated(swung())
     repaired = examine(swung(0.07), REFERENCE).run.pose[:, 2]
     assert np.std(repaired - swung().pose[:, 2]) < 0.006
 
@@ -212,7 +214,7 @@ def test_noise_of_a_yaw_rate_is_no_clock(seed):
     noise = rng.normal(size=(3, t.size)) * [[0.05], [0.05], [np.radians(0.025)]]
     pose = np.column_stack([2.0 * t, 0.0 * t, psi]) + noise.T
     rate = np.gradient(psi, t) + rng.normal(0.0, np.radians(0.25), t.size)
-    assert not told(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
+    assert not stated(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
 
 
 @pytest.mark.parametrize("heading", [0.1, 0.5])
@@ -223,7 +225,7 @@ def test_a_yaw_rate_with_more_noise_than_turn_has_no_scale(heading):
     noise = rng.normal(size=(3, t.size)) * [[0.05], [0.05], [np.radians(heading)]]
     pose = np.column_stack([2.0 * t, 0.0 * t, psi]) + noise.T
     rate = np.gradient(psi, t) + rng.normal(0.0, np.radians(0.6), t.size)
-    assert not told(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
+    assert not stated(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -236,7 +238,7 @@ def test_noise_of_the_heading_is_no_deviation_of_the_compass(seed):
         0.0, [0.01, 0.01, 1e-9], (t.size, 3)
     )
     run = Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": np.gradient(psi, t) + noise[1]})
-    assert not told(run)
+    assert not stated(run)
 
 
 @pytest.mark.parametrize("either", [True, False])
@@ -251,14 +253,14 @@ def test_a_clock_that_a_compass_would_look_like_is_told_with_it(monkeypatch, eit
 def test_without_a_speed_clock_and_scale_of_the_rate_are_one():
     run = beside(made(), r=1.06 * made().measured["r"])
     alone = replace(run, measured={"r": run.measured["r"]})
-    (found,) = told(alone).values()
+    (found,) = stated(alone).values()
     assert (found.channel, found.kind, found.alike, found.repaired) == (
         "r",
         "scale",
         ("clock_rate",),
         False,
     )
-    assert told(run)["r", "scale"].repaired
+    assert stated(run)["r", "scale"].repaired
 
 
 def test_findings_do_not_depend_on_where_and_how_the_earth_lies():
@@ -267,7 +269,7 @@ def test_findings_do_not_depend_on_where_and_how_the_earth_lies():
     c, s = np.cos(turn), np.sin(turn)
     x, y, psi = run.pose.T
     other = replace(run, pose=np.column_stack([c * x - s * y + 1e3, s * x + c * y - 5e3, psi + turn]))
-    a, b = told(run)["r", "scale"].value, told(other)["r", "scale"].value
+    a, b = stated(run)["r", "scale"].value, stated(other)["r", "scale"].value
     assert a == pytest.approx(b, abs=1e-4)
 
 
@@ -364,7 +366,7 @@ def test_without_turns_clock_and_scale_are_one_and_the_speed_is_set_aside(factor
     """What is learned of it is not sure where a clock at that rate would matter."""
     straight = made(turning=0.0)
     run = beside(straight, u=factor * straight.measured["u"], v=factor * straight.measured["v"])
-    found = told(run)["u", "scale"]
+    found = stated(run)["u", "scale"]
     assert found.alike == ("clock_rate",)
     assert not found.repaired
     assert found.aside == ("u", "v")
@@ -432,7 +434,7 @@ def test_a_time_that_was_not_logged_says_nothing_of_the_clock(first, last):
 def test_where_a_yaw_rate_is_missing_it_contradicts_no_heading(first, last, factor):
     run = made()
     missing = (run.time >= first) & (run.time <= last)
-    found = told(beside(run, r=np.where(missing, np.nan, factor * run.measured["r"])))
+    found = stated(beside(run, r=np.where(missing, np.nan, factor * run.measured["r"])))
     assert [*found] == [("r", "scale")] * (factor != 1.0)
     if found:
         assert found["r", "scale"].value == pytest.approx(factor, rel=0.02)
@@ -441,7 +443,7 @@ def test_where_a_yaw_rate_is_missing_it_contradicts_no_heading(first, last, fact
 def test_seconds_that_a_log_has_too_many_are_told():
     """The ship is where it was: its clock was set ahead."""
     run = made()
-    found = told(replace(run, time=np.where(run.time < 80.0, run.time, run.time + 20.0)))
+    found = stated(replace(run, time=np.where(run.time < 80.0, run.time, run.time + 20.0)))
     assert found["time", "clock_gap"].value == pytest.approx(-20.0, abs=0.3)
 
 
@@ -480,9 +482,9 @@ def test_a_second_antenna_has_its_place_and_delay_and_a_second_heading_its_offse
         ("x_2", "delay", "s"): (late, 0.05),
         ("psi_2", "offset", "rad"): (turned, 1e-3),
     }
-    told = {(f.channel, f.kind, f.unit): f for f in found.findings}
-    assert told.keys() == {key for key, (value, _) in true.items() if value}
-    for key, f in told.items():
+    stated = {(f.channel, f.kind, f.unit): f for f in found.findings}
+    assert stated.keys() == {key for key, (value, _) in true.items() if value}
+    for key, f in stated.items():
         assert f.value == pytest.approx(true[key][0], abs=true[key][1])
         assert f.value - f.ci95[0] == pytest.approx(f.ci95[1] - f.value)
         assert (f.start, f.end) == (0.0, SECONDS)
@@ -590,7 +592,7 @@ def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
     assert "r is 5.0 % too large" in capsys.readouterr().out
     again = diagnosis.read(tmp_path / "b.csv")
-    assert not told(again)
+    assert not stated(again)
     assert again.noise == {"r": 0.002}
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 2
 

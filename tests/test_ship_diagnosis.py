@@ -47,8 +47,8 @@ def test_columns_of_a_described_ship_are_proposed(run, tmp_path, capsys):
     other.to_csv(tmp_path / "run.csv", index=False)
     command = [str(tmp_path / "run.csv"), "--ship", "otter", "--write"]
     assert propose_columns.main(command) == 0
-    told = json.loads((tmp_path / "run.csv.json").read_text())["columns"]
-    assert told == {"port.n": {"name": "Port n [rpm]", "unit": "rpm"}, "starboard.n": "STARBOARD_N"}
+    stated = json.loads((tmp_path / "run.csv.json").read_text())["columns"]
+    assert stated == {"port.n": {"name": "Port n [rpm]", "unit": "rpm"}, "starboard.n": "STARBOARD_N"}
     found = read(tmp_path / "run.csv", of=ship_with((), "otter"))
     np.testing.assert_allclose(found.commands, run[["port.n", "starboard.n"]], rtol=1e-9)
 
@@ -89,15 +89,15 @@ def test_the_described_lag_is_not_reported_as_a_delay(ship, run):
 
 
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "stated"),
     [
         ({"port.n": "prot.n"}, "no column 'port.n'; did you mean 'prot.n'"),
         ({"port.n": "a", "starboard.n": "b"}, "no commands: port.n, starboard.n"),
         ({"port.n": "port.n [kg]"}, "'kg' is not a unit of port.n"),
     ],
 )
-def test_a_wrong_column_is_told_in_one_line(ship, run, columns, told):
-    with pytest.raises(InputError, match=told.replace(".", r"\.")):
+def test_a_wrong_column_is_told_in_one_line(ship, run, columns, stated):
+    with pytest.raises(InputError, match=stated.replace(".", r"\.")):
         read_frame(run.rename(columns=columns), "run", ship)
 
 
@@ -122,14 +122,14 @@ def test_commands_far_beyond_their_limit_are_refused_and_say_since_when(ship, ru
 
 
 @pytest.mark.parametrize(
-    ("read_as", "told", "fix"),
+    ("read_as", "stated", "fix"),
     [
         (lambda n: n / 16.541, "are in shares of the limits", {"factor": 16.54}),
         (lambda n: -n, "commands have the wrong sign", {"flip": True}),
     ],
 )
 def test_commands_in_another_unit_or_sign_are_told_with_what_mends_them(
-    run, tmp_path, read_as, told, fix
+    run, tmp_path, read_as, stated, fix
 ):
     table = run[run["time"] < 40.0].copy()
     names = ["port.n", "starboard.n"]
@@ -137,7 +137,7 @@ def test_commands_in_another_unit_or_sign_are_told_with_what_mends_them(
     table.to_csv(tmp_path / "run.csv", index=False)
     with pytest.raises(InputError) as error:
         diagnosis.load(tmp_path / "run.csv", ship="otter")
-    assert told in str(error.value)
+    assert stated in str(error.value)
     line = {"columns": {n: {"name": n} | fix for n in names}}
     assert f"put {json.dumps(line)} into" in str(error.value)
 

@@ -424,7 +424,7 @@ def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None
     (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{law}` |")]
     _, commands, _, numbers = row.split(" | ")
     assert re.findall(r"`(\w+)`", commands) == [c.name for c in Law.known[law].commands]
-    told = {
+    stated = {
         name: unit
         for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) \[(.+?)\]", numbers)
         for name in re.findall(r"`(\w+)`", names)
@@ -432,7 +432,7 @@ def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None
     inner = re.compile(r"table_([xy]_)?\d_\d")  # of a table its first and its last cell stand there
     declared = [v for v in variables(Law.known[law].Parameters) if not inner.fullmatch(v.name)]
     declared += [v for v in variables(Law.known[law].Parameters) if v.name.endswith(("_1_1", "_9_3"))]
-    assert told == {v.name: v.unit for v in declared}
+    assert stated == {v.name: v.unit for v in declared}
 
 
 def test_the_page_of_parameters_has_the_start_values_of_the_code() -> None:

@@ -39,16 +39,16 @@ def otter(tmp_path_factory):
 
 
 def test_the_log_names_the_ship_and_holds_its_commands(otter):
-    told = json.loads((otter / "log.json").read_text())
-    assert told["scenario"]["ship"] == "otter"
-    assert {"thrusters.port_n", "thrusters.starboard_n"} <= told["columns"].keys()
+    stated = json.loads((otter / "log.json").read_text())
+    assert stated["scenario"]["ship"] == "otter"
+    assert {"thrusters.port_n", "thrusters.starboard_n"} <= stated["columns"].keys()
     assert read_options(otter).outline == AnnotatedOutline("otter", OTTER.length, OTTER.outline)
 
 
 @pytest.mark.parametrize("path", ["vessel.fmu", "thrusters.fmu", "controller_pid.fmu"])
 def test_bare_names_are_the_fmus_of_the_ship(otter, path):
-    told = json.loads((otter / "log.json").read_text())["fmus"].values()
-    (used,) = [fmu["guid"] for fmu in told if fmu["path"].endswith(path)]
+    stated = json.loads((otter / "log.json").read_text())["fmus"].values()
+    (used,) = [fmu["guid"] for fmu in stated if fmu["path"].endswith(path)]
     (theirs,) = build(path, ship=OTTER)
     (usual,) = build(path)
     assert used == FmuModel(theirs).description.guid != FmuModel(usual).description.guid

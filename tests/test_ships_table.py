@@ -268,8 +268,8 @@ def test_the_page_begins_with_what_others_win(tmp_path):
     assert [*ships.lost(ships.means(folder, 0))] == [("heading", "calibrated", "nominal")]
     answer("ridge", 0.05, 0.01)
     page = ships.write(tmp_path).read_text()
-    told = "| kvlcc2, 20 s | position | calibrated | ridge |"
-    assert page.index(told) < page.index("Errors in windows")
+    stated = "| kvlcc2, 20 s | position | calibrated | ridge |"
+    assert page.index(stated) < page.index("Errors in windows")
     assert "| kvlcc2, 20 s | heading | calibrated | nominal, ridge |" in page
     for name in ("nominal", "ridge"):
         (folder / f"{name}.json").unlink()
@@ -362,8 +362,8 @@ def test_another_version_of_the_simulator_is_refused(monkeypatch, other):
 def test_a_data_set_without_its_simulator_is_left_out_in_one_line(monkeypatch, capsys, tmp_path):
     monkeypatch.setitem(sys.modules, "python_vehicle_simulator", None)
     assert ships.main([str(tmp_path), "--datasets", "otter", "--out", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr()
-    (line,) = [x for x in (told.out + told.err).splitlines() if "'otter' is left out" in x]
+    stated = capsys.readouterr()
+    (line,) = [x for x in (stated.out + stated.err).splitlines() if "'otter' is left out" in x]
     assert "'otter'" in line
     assert "pip install git+https" in line
     assert not (tmp_path / "out" / "otter").exists()

@@ -251,7 +251,7 @@ def test_falls_have_all_that_bounds_them(monkeypatch):
 
 
 def test_each_run_is_left_out_of_those_learned_from(monkeypatch):
-    asked, told = [], []
+    asked, reported = [], []
 
     def diagnose(runs, out, prior, advance):
         advance("fit")
@@ -260,10 +260,10 @@ def test_each_run_is_left_out_of_those_learned_from(monkeypatch):
     monkeypatch.setattr(diagnosis, "diagnose", diagnose)
     runs = [SimpleNamespace(run=SimpleNamespace(name=n)) for n in "abc"]
     a, b, c = runs
-    assert len(measured_ship.learned(runs, 0.1, False, told.append)) == 3
+    assert len(measured_ship.learned(runs, 0.1, False, reported.append)) == 3
     assert asked == [([b, c], [a], 0.1), ([a, c], [b], 0.1), ([a, b], [c], 0.1)]
-    assert told == ["without a: fit", "without b: fit", "without c: fit"]
-    assert len(measured_ship.learned(runs, None, True, told.append)) == 1
+    assert reported == ["without a: fit", "without b: fit", "without c: fit"]
+    assert len(measured_ship.learned(runs, None, True, reported.append)) == 1
     monkeypatch.setattr(diagnosis, "gather", lambda files, advance: (files, advance))
     assert leave_one_out.gather(["x", "y"], print) == (["x", "y"], print)
 
@@ -283,7 +283,7 @@ def test_runs_without_commands_of_each_vsp_explain_nothing():
 # Tables
 
 
-def told(tmp_path, write, *given):
+def reported(tmp_path, write, *given):
     """Text and results of a report with one part."""
     report = Report(tmp_path, "t")
     write(report, *given)
@@ -309,7 +309,7 @@ def test_findings_are_told_with_their_shares_or_that_there_are_none(tmp_path):
     content = SimpleNamespace(
         accepted=[effect, alone], suspect_coefficients=suspects, stability=stability
     )
-    text, _ = told(tmp_path, ship_tables.write_findings, "Learned", content)
+    text, _ = reported(tmp_path, ship_tables.write_findings, "Learned", content)
     assert "## Learned" in text
     assert "| `lag` | x = 1 (0, 2) | 0.90 | 0.00 | delay, Y_r |" in text
     assert "| `N_r` | y | 0.00 | 0.50 | none |" in text
@@ -322,7 +322,7 @@ def test_findings_are_told_with_their_shares_or_that_there_are_none(tmp_path):
         False,
         None,
     )
-    text, _ = told(tmp_path, ship_tables.write_findings, "Learned", content)
+    text, _ = reported(tmp_path, ship_tables.write_findings, "Learned", content)
     assert "No effect was found." in text
     assert "probably wrong: none." in text
     assert "does not hold the learned ship" in text
@@ -336,13 +336,13 @@ def test_expectations_are_told_by_run_with_delays_that_need_no_model(tmp_path):
         )
         for name, delay in (("a", 0.25), ("b", float("nan")))
     ]  # fmt: skip
-    text, results = told(tmp_path, ship_tables.write_expected, made)
+    text, results = reported(tmp_path, ship_tables.write_expected, made)
     assert "| expected | without a | without b |" in text
     assert "| delay of 0.3 to 0.5 s | 0.4 s | 0.4 s |" in text
     assert "the delay of the commands: a 0.25 s. The" in text
     assert results["late"] == {"a": 0.25, "b": None}
     assert len(results["expected"]) == 4
-    text, _ = told(tmp_path, ship_tables.write_expected, made[1:])
+    text, _ = reported(tmp_path, ship_tables.write_expected, made[1:])
     assert "Pose and commands alone" not in text
 
 
@@ -359,7 +359,7 @@ def test_the_learned_curve_is_held_against_the_pulls(tmp_path, monkeypatch):
     assert pulls.command == pytest.approx(COMMANDS)
     assert pulls.force == pytest.approx(pulled)
     folds = [SimpleNamespace(name=n, model=straight) for n in "ab"]
-    text, results = told(tmp_path, ship_tables.write_curve, folds, curved, pulls)
+    text, results = reported(tmp_path, ship_tables.write_curve, folds, curved, pulls)
     assert "0.000 N learned from all" in text
     assert "the target was 0.1 N: reached." in text
     assert list(results["bollard"]["differences"]) == ["nominal", "all runs", "without a", "without b"]
@@ -372,7 +372,7 @@ def test_the_learned_curve_is_held_against_the_pulls(tmp_path, monkeypatch):
     assert lines["bollard pulls, not learned from"].get_ydata() == pytest.approx(pulled)
     assert lines["learned, one run left out"].get_alpha() < 1.0, "behind the learned line"
     assert (len(axes.get_lines()), len(axes.get_legend().get_texts())) == (5, 4), "folds share a label"
-    text, _ = told(tmp_path, ship_tables.write_curve, folds, straight, pulls)
+    text, _ = reported(tmp_path, ship_tables.write_curve, folds, straight, pulls)
     assert "the target was 0.1 N: not reached." in text
 
 

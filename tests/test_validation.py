@@ -106,11 +106,11 @@ def write_criteria(path, *criteria, **more):
 
 @pytest.mark.parametrize("statistic", ["fraction", "median", "rms"])
 def test_all_three_outcomes(statistic):
-    told = {"statistic": statistic}
-    assert outcome(np.full(60, 0.5), **told) == "met"
-    assert outcome(np.full(60, 2.0), **told) == "not met"
+    stated = {"statistic": statistic}
+    assert outcome(np.full(60, 0.5), **stated) == "met"
+    assert outcome(np.full(60, 2.0), **stated) == "not met"
     few = [0.5, 0.6, 0.4, 1.2][: 4 if statistic == "rms" else 3]
-    assert outcome(few, **told) == "cannot be judged"
+    assert outcome(few, **stated) == "cannot be judged"
 
 
 def test_a_model_that_runs_away_does_not_meet_a_share():
@@ -159,14 +159,14 @@ def test_a_criterion_that_is_met_is_told_so_at_the_rate_of_its_bound():
 
 def met_share(tolerance, correlation, n=120, records=400, given=None):
     rng, run = np.random.default_rng(7), np.zeros(n, int)
-    told = 0
+    stated = 0
     for _ in range(records):
         errors = rng.standard_normal(n)
         for k in range(1, n):
             errors[k] = correlation * errors[k - 1] + np.sqrt(1.0 - correlation**2) * errors[k]
         free = given or independent(np.abs(errors), run)
-        told += outcome(errors, n=free, tolerance=tolerance) == "met"
-    return told / records
+        stated += outcome(errors, n=free, tolerance=tolerance) == "met"
+    return stated / records
 
 
 def test_bounds_of_a_share_are_those_of_the_binomial_distribution():

@@ -62,8 +62,8 @@ def test_restrictions_and_counts_are_in_the_record(comparison, tmp_path):
         assert j.offered == j.windows + sum(j.excluded.values())
     assert 0 < narrow.excluded["mean u not from -0.5 to 0.1"] < free.windows
     assert narrow.excluded["not among the runs of the criterion"] > 0
-    told = [*lines(v.content)]
-    assert f"{narrow.windows} of {narrow.offered} windows of 2 of 3 runs count" in told[1]
+    stated = [*lines(v.content)]
+    assert f"{narrow.windows} of {narrow.offered} windows of 2 of 3 runs count" in stated[1]
     assert v.content.criteria.content["criteria"][1]["operating_range"] == {"u": [-0.5, 0.1]}
 
 
@@ -317,11 +317,11 @@ def test_times_are_local_with_their_offset(monkeypatch):
 
 
 def test_the_pdf_is_fit_for_a_client(comparison, tmp_path):
-    told = {"client": "Yard & Sons <Ltd>", "assessor": "A. Sessor", "document": "CY-42"}
-    validated(comparison, tmp_path, {"name": "close enough"}, particulars=told).write(tmp_path / "out")
+    stated = {"client": "Yard & Sons <Ltd>", "assessor": "A. Sessor", "document": "CY-42"}
+    validated(comparison, tmp_path, {"name": "close enough"}, particulars=stated).write(tmp_path / "out")
     pages = [page.extract_text() for page in pypdf.PdfReader(tmp_path / "out" / FILES[2]).pages]
     first = " ".join(pages[0].split())
-    for text in (*told.values(), "nominal model", "cse1", "close enough", "met", "not given", "u_val"):
+    for text in (*stated.values(), "nominal model", "cse1", "close enough", "met", "not given", "u_val"):
         assert text in first
     for k, page in enumerate(pages, 1):
         assert f"page {k} of {len(pages)}" in page

@@ -162,14 +162,14 @@ def test_a_start_value_of_a_document_is_of_the_type_of_its_element():
     ]
     assert found == [15.0, 7, True, False, "1"]
     assert [type(x) for x in found] == [float, int, bool, bool, str]
-    for kind, text, told in (
+    for kind, text, stated in (
         ("Real", "one", "p = 'one' is not a number"),
         ("Real", "1e999", "is not a number"),
         ("Integer", "1.5", "p = '1.5' is not a whole number"),
         ("Boolean", "yes", "is neither true nor false"),
         ("Binary", "00", "values of type Binary are not supported"),
     ):
-        with pytest.raises(InputError, match=told):
+        with pytest.raises(InputError, match=stated):
             of(kind, text)
 
 
@@ -234,7 +234,7 @@ def test_a_mapping_renames_scales_and_may_keep_the_unit():
 
 
 @pytest.mark.parametrize(
-    ("bindings", "told"),
+    ("bindings", "stated"),
     [
         ('<ssd:ParameterBinding type="text/csv"/>', "this kind of parameter binding is not supported"),
         (
@@ -245,8 +245,8 @@ def test_a_mapping_renames_scales_and_may_keep_the_unit():
         (inline('<ssv:Parameter name="m"/>'), "the parameter 'm' has no value"),
     ],
 )
-def test_bindings_that_cannot_be_read_are_refused(bindings, told):
-    with pytest.raises(InputError, match=told):
+def test_bindings_that_cannot_be_read_are_refused(bindings, stated):
+    with pytest.raises(InputError, match=stated):
         read(bindings)
 
 

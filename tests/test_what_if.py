@@ -155,8 +155,8 @@ def test_page_computes_the_errors_of_the_report_and_of_any_other_values(driven, 
     assert np.allclose(
         rows["moved"][:, [2, 5]], [[e.position, e.heading] for e in known], rtol=1e-6, atol=0.0
     )
-    told = [[e.before.omega_rms, e.after.omega_rms] for e in report.evaluations]
-    assert np.allclose(np.moveaxis(forces[:, :, :2], 1, 2), told, rtol=1e-6, atol=0.0)
+    stated = [[e.before.omega_rms, e.after.omega_rms] for e in report.evaluations]
+    assert np.allclose(np.moveaxis(forces[:, :, :2], 1, 2), stated, rtol=1e-6, atol=0.0)
     assert np.allclose(forces[:, :, 2], [e.omega_rms for e in known], rtol=1e-6, atol=0.0)
     assert (np.abs(rows["moved"][:, 2] / rows["initial"][:, 2] - 1.0) > 0.1).all()
 

@@ -77,10 +77,10 @@ def test_a_run_by_name_has_log_metrics_and_pictures(tmp_path, monkeypatch):
 )  # fmt: skip
 def test_what_was_meant_is_one_line(tmp_path, monkeypatch, call, line):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((cosim.InputError, BuildError)) as told:
+    with pytest.raises((cosim.InputError, BuildError)) as stated:
         call()
-    assert line in str(told.value)
-    assert "\n" not in str(told.value)
+    assert line in str(stated.value)
+    assert "\n" not in str(stated.value)
     assert not any(tmp_path.iterdir())
 
 
@@ -92,11 +92,11 @@ def test_one_fmu_by_its_name_goes_to_a_folder_by_its_name(tmp_path, monkeypatch)
 
 def described(folder, seed):
     """A finished run with this seed in a folder; its description."""
-    told = {"scenario": {"name": "x", "seed": seed}, "fmus": {"vessel": {"sha256": "1", "path": "p"}}}
+    stated = {"scenario": {"name": "x", "seed": seed}, "fmus": {"vessel": {"sha256": "1", "path": "p"}}}
     if folder is not None:
         folder.mkdir(parents=True)
-        (folder / "log.json").write_text(json.dumps(told))
-    return told
+        (folder / "log.json").write_text(json.dumps(stated))
+    return stated
 
 
 def test_the_default_folder_is_not_that_of_another_run(tmp_path, monkeypatch):
@@ -140,8 +140,8 @@ def test_a_run_that_is_refused_has_no_note_on_its_folder(tmp_path, monkeypatch):
     assert not any("another run" in note for note in heard)
     assert not Path("results/ellipse_2").exists()
     cosim.simulate("ellipse", set=SHORT, show=heard.append)
-    told = f"note: another run is in '{Path('results/ellipse')}'; this one is written to"
-    assert f"{told} '{Path('results/ellipse_2')}'" in heard
+    stated = f"note: another run is in '{Path('results/ellipse')}'; this one is written to"
+    assert f"{stated} '{Path('results/ellipse_2')}'" in heard
 
 
 def test_a_diagnosis_that_is_refused_has_no_note_on_its_folder(tmp_path, capsys):
@@ -223,13 +223,15 @@ def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
     ellipse["fmus"]["observer"] = {"path": observer}
     file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0, Y_r=-6.0, V_n=0.1)
     system = prepare(load_scenario(ellipse), controller_models=[(file, cosim.read_parameters(file))])
-    told = {name: {v.name: x for v, x in values} for name, values in system.parameters.items()}
-    controller = told["controller"]
+    stated = {name: {v.name: x for v, x in values} for name, values in system.parameters.items()}
+    controller = stated["controller"]
     assert controller["X_u"] == pytest.approx(-2.6555)  # the nominal value and the addition
     assert controller["phi_0_2"] == -6.0  # where adaptation of Y_r starts
     assert controller["phi_0_6"] == -1.9  # N_r, of which the file says nothing: nominal
-    assert ("X_u" in told["observer"]) == (observer == "observer_luenberger.fmu")
-    assert told["vessel"] == ellipse["fmus"]["vessel"].get("parameters", {})  # the plant is what it was
+    assert ("X_u" in stated["observer"]) == (observer == "observer_luenberger.fmu")
+    assert stated["vessel"] == ellipse["fmus"]["vessel"].get(
+        "parameters", {}
+    )  # the plant is what it was
     assert any(
         "no controller and no observer of the scenario uses vessel.V_n" in w for w in system.warnings
     )
@@ -309,19 +311,19 @@ def test_bash_completes_commands_options_values_scenarios_and_files(tmp_path, ca
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "stated"),
     [
         (["--help"], 0, "cybership completion fish | source"),
         (["bsh"], 2, "invalid choice: 'bsh'"),
         ([], 2, "required: shell"),
     ],
 )
-def test_completion_has_help_and_names_its_shells(arguments, code, told, capsys):
+def test_completion_has_help_and_names_its_shells(arguments, code, stated, capsys):
     with pytest.raises(SystemExit) as ended:
         completion.main(arguments)
     assert ended.value.code == code
     shown = capsys.readouterr()
-    assert told in (shown.err if code else shown.out)
+    assert stated in (shown.err if code else shown.out)
     assert "``" not in shown.err + shown.out
 
 

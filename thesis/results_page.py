@@ -192,7 +192,7 @@ def store_weight(r: Results) -> Numbers:
         [position("eight", n, form, "0.1") for form in forms for n in four if kind in n]
         for kind, forms in (("win", (STALE,)), ("svd", (STALE, "stale, ungated")))
     )
-    told = [position("eight", n, "stale, ungated", "0.1") for n in four if "win" in n]
+    stated = [position("eight", n, "stale, ungated", "0.1") for n in four if "win" in n]
     fresh = {p: [1e3 * position(p, n, "fresh, ungated") for n in four] for p in PATHS}
     orders = [row[-1] for row in cells(r, "stored errors, samples, weight") if row[-1] in ("yes", "no")]
     half = len(orders) // 2
@@ -200,7 +200,7 @@ def store_weight(r: Results) -> Numbers:
         "six": ", ".join(f"{x:.4f} m ({n})" for n, x in zip(SIX, six, strict=True)),
         "weight_1": ends((position("ellipse", n, STALE, "1") for n in four), ".1f"),
         "eight_window": ends(window, ".1f"),
-        "eight_window_told": ends(told, ".4f"),
+        "eight_window_told": ends(stated, ".4f"),
         "eight_svd": ends(svd, ".2f"),
         "fresh_ellipse": ends(fresh["ellipse"], ".1f"),
         "fresh_eight": f"{max(fresh['eight']):.1g}",

@@ -26,7 +26,7 @@ FORMS = {
     "stale, gated": {"controller.stale": 1.0},
     "stale, ungated": {"controller.stale": 1.0, **UNGATED},
 }
-# Forms of which the controller is not told the clipped force, as printed.
+# Forms of which the controller does not get the clipped force, as printed.
 UNTOLD = {f"{form}, request": changes for form, changes in FORMS.items() if "ungated" in form}
 PLAIN = "as it is"
 
@@ -45,10 +45,10 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
             found[f"{name}|{PLAIN}|1"] = own
             continue
         for form, changes in (FORMS | UNTOLD).items():
-            told: Content = {} if form in FORMS else {"optional_connections": []}
+            stated: Content = {} if form in FORMS else {"optional_connections": []}
             for weight in WEIGHTS:
                 values = {**changes, "controller.store_weight": weight}
-                found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values, **told)
+                found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values, **stated)
     return found
 
 

@@ -33,8 +33,10 @@ def answer_all(names: Sequence[str], problems: Path, out: Path, tree: Path, jobs
             found, name = task.result(), tasks[task]
             text = json.dumps(found, indent=1, allow_nan=False) + "\n"
             (out / f"{name}.json").write_text(text, encoding="utf-8")
-            told = found.get("diagnosis", {}).get("verdict", "")
-            print(f"{time.monotonic() - begun:6.0f} s  {name}: exit {found['exit']} {told}", flush=True)
+            stated = found.get("diagnosis", {}).get("verdict", "")
+            print(
+                f"{time.monotonic() - begun:6.0f} s  {name}: exit {found['exit']} {stated}", flush=True
+            )
     used = os.times()
     print(f"{used.children_user + used.children_system:.0f} s of processor time")
 

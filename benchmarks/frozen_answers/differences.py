@@ -95,9 +95,9 @@ def headline(answer: Mapping[str, Any]) -> dict[str, Any]:
     content = answer.get("diagnosis") or answer.get("comparison") or {}
     found: dict[str, Any] = {"exit": answer.get("exit"), "verdict": content.get("verdict")}
     for group in ("effects", "possibilities"):
-        told = content.get(group) or []
-        found[group] = " ".join(e["id"] for e in told)
-        found |= {f"confidence of {e['id']}": e.get("confidence") for e in told}
+        stated = content.get(group) or []
+        found[group] = " ".join(e["id"] for e in stated)
+        found |= {f"confidence of {e['id']}": e.get("confidence") for e in stated}
     for error in content.get("errors") or []:
         if error.get("held_out") or error.get("use") == "test":
             key = f"held-out position error of {error['run']}"

@@ -57,12 +57,12 @@ def answer(problem: Problem, peers: bool) -> Answer:
     seconds = time.process_time() - begun
     found = {name: value for name, value in content.items() if name not in LEFT_OUT}
     pairs = zip(diagnosis.learned.effects, diagnosis.believed, strict=True)
-    told = [f.evidence for f, is_finding in pairs if is_finding]
+    stated = [f.evidence for f, is_finding in pairs if is_finding]
     posterior = diagnosis.posterior
     names = [name.partition(".")[2] for name in posterior.names]
     found["posterior"] = [names, posterior.mean.tolist(), posterior.covariance.tolist()]
     found["bands"] = within_bands(diagnosis.comparison)
-    found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
+    found["evidence"] = [None if e is None else list(map(float, e)) for e in stated]
     found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
     found["worse"] = [name for name, is_worse in predictions(diagnosis.comparison).items() if is_worse]
     if peers and problem.hidden:

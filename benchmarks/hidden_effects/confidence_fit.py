@@ -38,9 +38,9 @@ def judged(rows: Iterable[Row]) -> list[Judged]:
     """All findings of some cells of which the diagnosis tells the evidence."""
     found = []
     for r in rows:
-        for told, true in zip(r.evidence, r.true, strict=True):
-            if told:
-                bagged, left, varies, *_ = map(float, told.split())
+        for stated, true in zip(r.evidence, r.true, strict=True):
+            if stated:
+                bagged, left, varies, *_ = map(float, stated.split())
                 found.append(Judged(bagged, left, varies, true == "1"))
     return found
 

@@ -242,7 +242,7 @@ def sail_all(orders: Sequence[Order]) -> list[Voyage | RunawayError]:
         mine = [k for k, o in enumerate(orders) if o.hidden.other == other]
         for first in range(0, len(mine), TOGETHER):
             some = mine[first : first + TOGETHER]
-            with np.errstate(all="ignore"):  # a ship that runs away overflows, and is told so
+            with np.errstate(all="ignore"):  # a ship that runs away overflows, and is reported so
                 log = Fleet([orders[k] for k in some]).run()
             for lane, k in enumerate(some):
                 found[k] = _voyage(orders[k], np.ascontiguousarray(log[:, :, lane]))

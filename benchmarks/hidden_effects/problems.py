@@ -205,21 +205,21 @@ def confusable(hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> l
 
 def keep(problem: Problem, folder: Path) -> None:
     """Write a problem to a file of its own."""
-    told = asdict(problem)
-    del told["runs"]
+    stated = asdict(problem)
+    del stated["runs"]
     columns: dict[str, Any] = {
         f"run{k}": np.column_stack([r.time, r.pose, r.tau_cmd]) for k, r in enumerate(problem.runs)
     }
     names = json.dumps([r.name for r in problem.runs])
     with atomic_write(folder / f"{slug(problem.key)}.npz") as part, part.open("wb") as file:
-        np.savez(file, told=np.array(json.dumps(told)), names=np.array(names), **columns)
+        np.savez(file, stated=np.array(json.dumps(stated)), names=np.array(names), **columns)
 
 
 def kept(key: Key, folder: Path) -> Problem:
     """A problem that was made before."""
     with np.load(folder / f"{slug(key)}.npz") as file:
-        told, names = json.loads(str(file["told"])), json.loads(str(file["names"]))
+        stated, names = json.loads(str(file["stated"])), json.loads(str(file["names"]))
         tables = [file[f"run{k}"] for k in range(len(names))]
-    told["hidden"] = [Draw(**d) for d in told["hidden"]]
+    stated["hidden"] = [Draw(**d) for d in stated["hidden"]]
     runs = [Run(n, t[:, 0], t[:, 1:4], t[:, 4:]) for n, t in zip(names, tables, strict=True)]
-    return Problem(**told, runs=runs)
+    return Problem(**stated, runs=runs)

@@ -1,4 +1,4 @@
-"""Reliability of confidences: how often findings that are told with a confidence are right."""
+"""Reliability of confidences: how often findings that are reported with a confidence are right."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ POINTS = 0.05  # a bin may be off by this, or lie within its interval
 
 
 class Told(NamedTuple):
-    """One finding: how sure it was told, and whether it is a true cause."""
+    """One finding: how sure it was, and whether it is a true cause."""
 
     confidence: float
     true: bool
@@ -52,7 +52,7 @@ class Bin:
         return abs(self.rate - self.confidence) <= POINTS or self.low <= self.confidence <= self.high
 
 
-def told(rows: Iterable[Row]) -> list[Told]:
+def stated(rows: Iterable[Row]) -> list[Told]:
     """All findings of some cells."""
     return [
         Told(float(c), true == "1") for r in rows for c, true in zip(r.confidences, r.true, strict=True)
@@ -101,7 +101,7 @@ def tables(rows: Sequence[Row]) -> dict[str, list[Bin]]:
     """Bins of all cells together, and of each kind; only of cells that no calibration was fitted on."""
     shown = [r for r in rows if for_showing(r.effect, r.seed) and not r.note]
     kinds = {"all": shown} | {kind: [r for r in shown if r.kind == kind] for kind in KINDS}
-    found = {kind: told(some) for kind, some in kinds.items()}
+    found = {kind: stated(some) for kind, some in kinds.items()}
     return {kind: bins(findings) for kind, findings in found.items() if findings}
 
 
@@ -122,7 +122,7 @@ def draw_diagram(rows: Sequence[Row], path: Path) -> None:
         axes.errorbar(x, rate, errors, fmt="o", color="C0", capsize=3)
         for b in some:
             axes.annotate(str(b.count), (b.confidence, b.rate), (5, -11), textcoords="offset points")
-        axes.set(title=kind, xlabel="confidence told", xlim=(-0.03, 1.03), ylim=(-0.03, 1.03))
+        axes.set(title=kind, xlabel="stated confidence", xlim=(-0.03, 1.03), ylim=(-0.03, 1.03))
         axes.set_ylabel("share of findings that are right" if not k else "")
         axes.set_aspect("equal")
     with atomic_write(path) as part:

@@ -28,13 +28,13 @@ class Row:
         found: ids in order of acceptance.
         confidences: of each; empty where the method has none.
         true: for each whether it is a true cause, "1" or "0".
-        evidence: for each what its confidence is made of; empty where that is not told.
+        evidence: for each what its confidence is made of; empty where that is not known.
         reported: the first id, and those that the data do not distinguish from it.
         suspects: nominal coefficients that it says are wrong.
         withdrawn: ids that were accepted, and made unseen data worse.
         possible_ids: ids that were accepted, and are not believed.
         worse: position and heading, where predictions of the run held out became worse.
-        remainder: whether the model leaves a significant remainder, "1" or "0"; empty if not told.
+        remainder: whether the model leaves a significant remainder, "1" or "0"; empty if not known.
         intervals, covered: 95 % intervals of right findings, in process noise of all that was fitted,
             and how many hold the true value.
         damping: in process noise, how many standard deviations X_u, Y_v and N_r are off.

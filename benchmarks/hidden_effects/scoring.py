@@ -29,7 +29,7 @@ SAME_AS = {
 WIDE = 1.96  # standard deviations in half of a 95 % interval
 DAMPING = ("X_u", "Y_v", "N_r")
 IN_TIME = 0.5  # s, from the end of an outage as it was; half a second moves the ship by millimetres
-SMALL = 1e-6  # of a parameter that is told in the table
+SMALL = 1e-6  # of a parameter that is stated in the table
 
 
 def same_coefficients(effect: str) -> set[str]:
@@ -100,8 +100,8 @@ def _told(made: Row, answer: Answer) -> None:
     made.found = [e["id"] for e in effects]
     sure = [e["confidence"] for e in effects]
     made.confidences = [f"{0.0 if c is None else c:.4g}" for c in sure]
-    told = answer.get("evidence", [None] * len(effects))
-    made.evidence = ["" if e is None else " ".join(f"{x:.5g}" for x in e) for e in told]
+    stated = answer.get("evidence", [None] * len(effects))
+    made.evidence = ["" if e is None else " ".join(f"{x:.5g}" for x in e) for e in stated]
     made.reported = [effects[0]["id"], *effects[0]["indistinguishable"]] if effects else []
     made.suspects = [s["name"] for s in answer["suspect_coefficients"]]
     made.withdrawn = [w["id"] for w in answer.get("withdrawn", [])]
@@ -123,8 +123,8 @@ def _right(made: Row, hidden: Sequence[Draw], verdict: str) -> bool:
     first = made.found[: len(hidden)]
     if all(set(d.right) & set(first) for d in hidden):
         return True
-    told = verdict == "coefficients" and len(hidden) == 1
-    return told and bool(same_coefficients(hidden[0].effect) & set(made.suspects))
+    stated = verdict == "coefficients" and len(hidden) == 1
+    return stated and bool(same_coefficients(hidden[0].effect) & set(made.suspects))
 
 
 def in_time(coefficients: dict[str, Any], hidden: Draw) -> bool:

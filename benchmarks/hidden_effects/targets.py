@@ -134,7 +134,7 @@ def both(rows: Rows, kind: str) -> str:
 
 
 def doubt(rows: Rows) -> str:
-    """How often a separable effect at n1 is told as good as certain."""
+    """How often a separable effect at n1 is reported as good as certain."""
     return share(
         (r for r in rows if r.separable and r.noise == "n1"),
         lambda r: r.right and bool(r.confidences) and float(r.confidences[0]) >= CERTAIN,
@@ -142,7 +142,7 @@ def doubt(rows: Rows) -> str:
 
 
 def unknown(rows: Rows) -> str:
-    """How often physics that no candidate has is told as such, all of them and each kind."""
+    """How often physics that no candidate has is reported as such, all of them and each kind."""
 
     def good(r: Row) -> bool:
         return (r.verdict == "unexplained" or r.remainder == "1") and r.surest < SURE

@@ -42,7 +42,7 @@ class Good:
     def noise(self, rates: Sequence[float]) -> np.ndarray:
         """(3,), standard deviation of what is noise for samples at some rates (3,) [Hz].
 
-        Motions above half of a rate cannot be told from noise by samples at that rate.
+        Motions above half of a rate cannot be distinguished from noise by samples at that rate.
         """
         of_table = 1.0 / float(np.median(np.diff(self.table["time"])))
         quick = np.zeros(3)

@@ -46,15 +46,15 @@ def line_faults(code: int, stderr: str, expected: set[int], late: float) -> list
 def agreement_faults(out: Path, status: str) -> list[str]:
     """What is wrong with journal, table and summary of a campaign that ended with a status."""
     wrong = []
-    told = json.loads((out / "campaign.json").read_text())
-    if told["status"] != status:
-        wrong.append(f"campaign.json says '{told['status']}', not '{status}'")
+    stated = json.loads((out / "campaign.json").read_text())
+    if stated["status"] != status:
+        wrong.append(f"campaign.json says '{stated['status']}', not '{status}'")
     lines = (out / "runs.jsonl").read_text().splitlines(keepends=True)
     journal = {json.loads(line)["hash"] for line in lines if line.endswith("\n")}
     path = out / "runs.parquet"  # of no run there is none
     table = set(pandas.read_parquet(path)["hash"]) if path.is_file() else set()
-    if journal != table or len(table) != told["done"] + told["failed"]:
-        counted = told["done"] + told["failed"]
+    if journal != table or len(table) != stated["done"] + stated["failed"]:
+        counted = stated["done"] + stated["failed"]
         wrong.append(f"{len(journal)} runs in the journal, {len(table)} in the table, {counted} counted")
     return wrong
 
@@ -88,9 +88,9 @@ def faults(
 def log_faults(out: Path, status: str) -> list[str]:
     """What is wrong with the log of a run that ended with a status."""
     wrong = []
-    told = json.loads((out / "log.json").read_text())
-    if told["status"] != status:
-        wrong.append(f"log.json says '{told['status']}', not '{status}'")
+    stated = json.loads((out / "log.json").read_text())
+    if stated["status"] != status:
+        wrong.append(f"log.json says '{stated['status']}', not '{status}'")
     rows = 0
     if (out / "log.csv").is_file():
         text = (out / "log.csv").read_text()
@@ -98,8 +98,8 @@ def log_faults(out: Path, status: str) -> list[str]:
         if text and not text.endswith("\n") and status != "running":
             wrong.append("a torn row")
         time = cosim.read_log(out)["time"]
-        if not np.allclose(np.diff(time), told["scenario"]["step"]):
+        if not np.allclose(np.diff(time), stated["scenario"]["step"]):
             wrong.append("rows are missing inside the log")
-    if status != "running" and told["rows"] != rows:
-        wrong.append(f"log.json counts {told['rows']} rows of {rows}")
+    if status != "running" and stated["rows"] != rows:
+        wrong.append(f"log.json counts {stated['rows']} rows of {rows}")
     return wrong

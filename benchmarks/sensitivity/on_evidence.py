@@ -29,7 +29,7 @@ def read(path: Path) -> list[EffectEvidence]:
 
 
 def outcome(e: EffectEvidence) -> str:
-    """What is said of a finding; the set of those that it cannot be told from has all of its weight."""
+    """What is said of a finding; a set that cannot be distinguished has all of its weight."""
     own = confidence.probability(e)
     of_set = own if e.bagged >= LEVEL else confidence.probability(e._replace(bagged=1.0))
     if not confidence.Confidence(own, of_set).is_finding:

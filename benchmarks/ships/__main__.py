@@ -216,10 +216,10 @@ def of_all(folder: Path, kept: Mapping[str, Any]) -> dict[str, dict[str, Means]]
 def write(folder: Path, kept: Mapping[str, Any] = MappingProxyType({})) -> Path:
     """The report of all answers in a folder, and of an earlier page, see :func:`of_all`; its path."""
     report, found = Report(folder, "Methods on ships", [SEED]), of_all(folder, kept)
-    told = [[title, *each] for title, methods in found.items() for each in lost(methods)]
-    if told:
+    stated = [[title, *each] for title, methods in found.items() for each in lost(methods)]
+    if stated:
         report.text("Here other methods have a smaller error than the best one of this project.")
-        report.table(["data", "error", "best of this project", "smaller error"], told)
+        report.table(["data", "error", "best of this project", "smaller error"], stated)
     packages = {p for p in ("sysidentpy", "pysindy", "scikit-learn") if _version(p)}
     report.text(
         """Errors in windows of runs that were left out of the training: geometric means over the runs,

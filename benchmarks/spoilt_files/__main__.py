@@ -21,13 +21,13 @@ PROCESSES = 2  # more need more memory than they save time (chosen)
 
 def line(o: Outcome) -> str:
     """A row of the table that is printed."""
-    told = ", ".join(f"{effect} {'-' if c is None else f'{c:.2f}'}" for effect, c in o.found.items())
+    stated = ", ".join(f"{effect} {'-' if c is None else f'{c:.2f}'}" for effect, c in o.found.items())
     mark = " WRONG" if o.wrong else ""
-    return f"| {o.way} | {o.kind}{mark} | {told or o.text} | {o.seconds:.0f} |"
+    return f"| {o.way} | {o.kind}{mark} | {stated or o.text} | {o.seconds:.0f} |"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; returns 1 if anything false is told with confidence."""
+    """Command line; returns 1 if anything false is reported with confidence."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.spoilt_files", description=__doc__)
     parser.add_argument("good", type=Path, metavar="GOOD", help="measurement, or folder of a run")
     parser.add_argument("--only", nargs="+", choices=list(WAYS), metavar="NAME", help="of the ways")

@@ -26,7 +26,7 @@ class Outcome:
         way: its name.
         kind: refused, kept, claim or traceback.
         text: the line of a refusal, the verdict, or the end of a traceback.
-        found: effects told, with their confidences.
+        found: effects reported, with their confidences.
         false: those of them that are absent.
         seconds: wall time.
     """
@@ -40,7 +40,7 @@ class Outcome:
 
     @property
     def wrong(self) -> bool:
-        """Whether a user is told something false with confidence, or nothing that makes sense."""
+        """Whether a user reads something false with confidence, or nothing that makes sense."""
         return self.kind == "traceback" or any((c or 0.0) >= SURE for c in self.false.values())
 
 
@@ -62,15 +62,15 @@ def outcome(way: str, good: pd.DataFrame, truth: Sequence[str], seed: int) -> Ou
         try:
             found = diagnosis.diagnose(diagnosis.load(file), seed=seed).content
         except diagnosis.InputError as error:
-            kind, text, told = "refused", str(error).replace(f"{folder}{os.sep}", ""), {}
+            kind, text, stated = "refused", str(error).replace(f"{folder}{os.sep}", ""), {}
         except Exception:
-            kind, text, told = "traceback", traceback.format_exc().strip().splitlines()[-1], {}
+            kind, text, stated = "traceback", traceback.format_exc().strip().splitlines()[-1], {}
         else:
-            told = {e.id: e.confidence for e in found.effects}
-            kind = "kept" if told and set(told) <= there else "claim"
+            stated = {e.id: e.confidence for e in found.effects}
+            kind = "kept" if stated and set(stated) <= there else "claim"
             text = found.verdict
-    false = {effect: c for effect, c in told.items() if effect not in there}
-    return Outcome(way, kind, text, told, false, round(time.monotonic() - start, 1))
+    false = {effect: c for effect, c in stated.items() if effect not in there}
+    return Outcome(way, kind, text, stated, false, round(time.monotonic() - start, 1))
 
 
 def table(good: Path) -> pd.DataFrame:

@@ -134,8 +134,8 @@ class Campaign(StrictModel):
                 )
         lengths = {name: len(axis.values or ()) for name, axis in self.axes.items()}
         if self.design == "list" and len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
-            raise ValueError(f"a list needs the same number of values in each axis: {told}")
+            stated = ", ".join(f"{name} has {count}" for name, count in lengths.items())
+            raise ValueError(f"a list needs the same number of values in each axis: {stated}")
         if sampled and all(axis.cross for axis in self.axes.values()):
             raise ValueError("all axes are crossed, so no axis is left to sample")
         return self

@@ -39,10 +39,10 @@ class CaseScenarios:
         """
         settings = [(path, case.values[name]) for name, path in self._loaded.outer_first]
         try:
-            return with_settings(self._loaded.base, settings, self._loaded.folder, told(case))
+            return with_settings(self._loaded.base, settings, self._loaded.folder, stated(case))
         except InputError as error:
             raise InputError(
-                str(error).replace(f"{told(case)}: ", "") + f" (in the run {told(case)})"
+                str(error).replace(f"{stated(case)}: ", "") + f" (in the run {stated(case)})"
             ) from None
 
     def job(self, case: Case) -> Job:
@@ -75,14 +75,14 @@ class CaseScenarios:
             try:
                 notes |= dict.fromkeys(prepare(scenario, models=self._files.models(scenario)).warnings)
             except InputError as error:
-                raise InputError(f"{error} (in the run {told(case)})") from None
+                raise InputError(f"{error} (in the run {stated(case)})") from None
         axes = self._loaded.campaign.axes
         if not self._loaded.base.faults and any("seed" in axis.paths for axis in axes.values()):
             notes["the scenario has no faults, so the seed has no effect"] = None
         return [*notes]
 
 
-def told(case: Case) -> str:
+def stated(case: Case) -> str:
     """A run by the values of its axes, for messages."""
     return ", ".join(f"{name} = {value}" for name, value in case.shown.items())
 

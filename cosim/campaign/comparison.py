@@ -184,15 +184,15 @@ class StopRule:
 
     def verdict(self, row: Callable[[int], RunRow | None]) -> dict[str, Any]:
         """What is known, for campaign.json: differences from the first value, or ratios less one."""
-        told: dict[str, Any] = {"known": self.satisfied(row), "pairs": self._seen - self._failed}
-        told |= {"axis": self.axis, "metric": self.metric, "against": next(iter(self._blocks[0]))}
+        stated: dict[str, Any] = {"known": self.satisfied(row), "pairs": self._seen - self._failed}
+        stated |= {"axis": self.axis, "metric": self.metric, "against": next(iter(self._blocks[0]))}
         for name, differences in self._differences.items():
             mean, half = interval(differences)
             ends = [mean, mean - half, mean + half]
             ends = [math.expm1(x) if self.relative else x for x in ends]
             kind = "ratio_less_one" if self.relative else "difference"
-            told.setdefault(kind, {})[name] = ends if np.isfinite(ends).all() else None
-        return told
+            stated.setdefault(kind, {})[name] = ends if np.isfinite(ends).all() else None
+        return stated
 
 
 def _shown(value: Any) -> str:

@@ -121,14 +121,14 @@ def run_campaign(
                 )
             work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder)
             work.recall(overwrite)
-            told = {
+            stated = {
                 "campaign": loaded.campaign.model_dump(mode="json", exclude_unset=True),
                 "scenario": loaded.base.model_dump(mode="json", by_alias=True, exclude_unset=True),
                 "fmus": files.origins,
                 "place": scheduler or ("this process" if workers == 0 else "processes on this computer"),
                 "versions": _versions(),
             }
-            return work.run(partial(place_for, files, scheduler, workers), told, progress)
+            return work.run(partial(place_for, files, scheduler, workers), stated, progress)
     finally:
         files.close()
 
@@ -203,12 +203,12 @@ class _Work:
         self.known |= {case.number: (case, h) for case, h in pairs if h in self.journal.rows}
 
     def run(
-        self, place: Callable[[], RunPlace], told: dict[str, Any], progress: Progress
+        self, place: Callable[[], RunPlace], stated: dict[str, Any], progress: Progress
     ) -> pandas.DataFrame:
         """Make the runs that are missing; journal, table and summary agree however that ends."""
-        self.started, self.told = time.time(), told
+        self.started, self.stated = time.time(), stated
         try:
-            write_roomy_json(self.folder / SUMMARY, self.told | self._state("running"))
+            write_roomy_json(self.folder / SUMMARY, self.stated | self._state("running"))
             self._keep("running")
         except OSError as error:
             raise InputError(not_written(self.folder, error)) from None
@@ -274,7 +274,7 @@ class _Work:
             self.journal.take_back()
             if status == "running":
                 raise
-        update_json(self.folder / SUMMARY, self.told, self._state(status, message))
+        update_json(self.folder / SUMMARY, self.stated, self._state(status, message))
         self.due = (ended := time.monotonic()) + (ended - started) / WRITING
         return made
 

@@ -74,11 +74,11 @@ class Journal:
 
     def _remember(self, line: bytes) -> None:
         try:
-            told = JournalLine.model_validate_json(line, strict=True)
+            stated = JournalLine.model_validate_json(line, strict=True)
         except ValueError:
             self.unread += line.endswith(b"\n")
             return
-        self.rows[told.hash] = RunRow(told.status, told.message, told.wall_s, told.metrics, {})
+        self.rows[stated.hash] = RunRow(stated.status, stated.message, stated.wall_s, stated.metrics, {})
 
     def finished(self, hash_: str) -> RunRow | None:
         """What is kept of a run that need not be made again; one that was lost may go well next time."""
@@ -91,11 +91,11 @@ class Journal:
         Raises:
             OSError: it cannot be written; then nothing of it is.
         """
-        told = {"hash": hash_, **row._asdict()}
-        del told["log"], told["value"]
+        stated = {"hash": hash_, **row._asdict()}
+        del stated["log"], stated["value"]
         begun = self._file.tell()
         try:
-            write_all(self._file, (json.dumps(told) + "\n").encode())
+            write_all(self._file, (json.dumps(stated) + "\n").encode())
         except OSError:
             self._file.truncate(begun)
             raise

@@ -33,15 +33,15 @@ def shown_progress(console: Console, quiet: bool) -> Iterator[Told]:
 
 def _lines(console: Console, quiet: bool) -> Told:
     """A line every half a minute, where there is no terminal."""
-    started = told = time.monotonic()
+    started = stated = time.monotonic()
     before: int | None = None  # ended in an earlier call of the command
 
     def progress(ended: int, failed: int, of: int) -> None:
-        nonlocal told, before
+        nonlocal stated, before
         now, before = time.monotonic(), ended if before is None else before
-        if quiet or now - told < LINE_EVERY or ended == before:
+        if quiet or now - stated < LINE_EVERY or ended == before:
             return
-        told = now
+        stated = now
         left = (now - started) * (of - ended) / (ended - before)
         said = f" ({failed} failed)" if failed else ""
         console.print(f"{ended} of {of} runs{said}, about {left:.0f} s left", markup=False)

@@ -80,7 +80,7 @@ class Analysed:
             else:
                 _in_folder(pool, scenario, run, self.folder)
             return RunRow("done", "", value=self.analyse(run))
-        except Exception as error:  # told where the runs were asked for
+        except Exception as error:  # reported where the runs were asked for
             return RunRow("failed", str(error), value=error)
 
 

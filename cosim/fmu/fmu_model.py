@@ -215,14 +215,14 @@ class FmuModel:
     @property
     def suggested_step(self) -> float | None:
         """Step of its default experiment [s]; None: it suggests none."""
-        told = self.description.defaultExperiment
-        return float(told.stepSize) if told is not None and told.stepSize else None
+        stated = self.description.defaultExperiment
+        return float(stated.stepSize) if stated is not None and stated.stepSize else None
 
     @property
     def needs_tool(self) -> bool:
         """Whether it needs the tool that it was made with (``needsExecutionTool``)."""
-        told = self.description.coSimulation
-        return bool(told is not None and told.needsExecutionTool)
+        stated = self.description.coSimulation
+        return bool(stated is not None and stated.needsExecutionTool)
 
     def unpack(self) -> Path:
         """Folder with the unpacked archive; made at the first call."""

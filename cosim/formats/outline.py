@@ -25,11 +25,11 @@ class AnnotatedOutline(NamedTuple):
     corners: tuple[tuple[float, float], ...]
 
     @classmethod
-    def read(cls, told: Mapping[str, Any]) -> "AnnotatedOutline | None":
+    def read(cls, stated: Mapping[str, Any]) -> "AnnotatedOutline | None":
         """An outline from the entries of JSON; None if these are of none."""
         try:
-            corners = tuple((float(x), float(y)) for x, y in told["corners"])
-            made = cls(str(told["name"]), float(told["length"]), corners)
+            corners = tuple((float(x), float(y)) for x, y in stated["corners"])
+            made = cls(str(stated["name"]), float(stated["length"]), corners)
         except (KeyError, TypeError, ValueError):
             return None
         numbers = [made.length, *(number for corner in corners for number in corner)]
@@ -86,8 +86,8 @@ class AnnotatedEstimate(NamedTuple):
 
 def read_estimates(annotations: Element | None) -> dict[str, AnnotatedEstimate]:
     """The parameters of an FMU that are estimates of a plant's, by name."""
-    told = [] if annotations is None else annotations.findall(ESTIMATE)
+    stated = [] if annotations is None else annotations.findall(ESTIMATE)
     return {
         e.get("parameter", ""): AnnotatedEstimate(e.get("of", ""), e.get("change") == "true")
-        for e in told
+        for e in stated
     }

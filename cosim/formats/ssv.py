@@ -203,9 +203,9 @@ def write_parameters(path: str | Path, content: ParameterSet) -> None:
             own = SubElement(annotations, f"{{{SSC}}}Annotation", type=RUN)
             within = SubElement(own, f"{{{SSV}}}ParameterSet", version="1.0", name=run)
             _write_entries(within, _named(values))
-        for told in content.learned_from:
+        for stated in content.learned_from:
             within = SubElement(annotations, f"{{{SSC}}}Annotation", type=LEARNED)
-            SubElement(within, CONTENT).text = json.dumps(told)  # the standard wants an element
+            SubElement(within, CONTENT).text = json.dumps(stated)  # the standard wants an element
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     path = Path(path)

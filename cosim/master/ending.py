@@ -58,9 +58,9 @@ class Result:
     trial: TrialOutcome | None = None
 
     def __repr__(self) -> str:
-        told = [f"{self.status}: {self.rows} rows in '{self.folder}'", self.message]
-        told += [f"{name} = {value:.4g}" for name, value in self.metrics.items()]
-        return f"<run {', '.join(text for text in told if text)}>"
+        stated = [f"{self.status}: {self.rows} rows in '{self.folder}'", self.message]
+        stated += [f"{name} = {value:.4g}" for name, value in self.metrics.items()]
+        return f"<run {', '.join(text for text in stated if text)}>"
 
     @cached_property
     def log(self) -> pandas.DataFrame:
@@ -167,8 +167,10 @@ def finish(
 
         with paused_collector(), writing(result):  # figures are many small objects, and short-lived
             runs = {system.scenario.name: columns}
-            told = RunOptions(window.start, window.stop, roles, system.outline, commands=system.commands)
-            drawn = drawing.draw(runs, result.folder, {system.scenario.name: told})
+            stated = RunOptions(
+                window.start, window.stop, roles, system.outline, commands=system.commands
+            )
+            drawn = drawing.draw(runs, result.folder, {system.scenario.name: stated})
             missing = drawing.PICTURES.keys() - {path.stem for path in drawn} - {drawing.COMMANDS}
             if result.trial is not None:
                 from ..trials.trial_picture import write_picture

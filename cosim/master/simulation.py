@@ -155,8 +155,8 @@ def _run(
             if isinstance(error, InputError):
                 raise
             _clear(folder, moved, show)
-            told = {"status": "failed", "rows": 0, "message": str(error)}
-            write_json(folder / logs.SIDECAR, {**description, **told})
+            stated = {"status": "failed", "rows": 0, "message": str(error)}
+            write_json(folder / logs.SIDECAR, {**description, **stated})
             return Result("failed", folder, message=str(error), warnings=system.warnings), None
         try:
             owner.leave_copies()
@@ -231,15 +231,15 @@ def _record(
             result.message = not_written(folder, error)
         recorder.close()
         result.rows = recorder.rows
-        told: dict[str, Any] = {"rows": result.rows, "loop": result.loop}
+        stated: dict[str, Any] = {"rows": result.rows, "loop": result.loop}
         if result.loop_reason:
-            told["loop_reason"] = result.loop_reason
+            stated["loop_reason"] = result.loop_reason
         if pace is not None:
-            result.pace = told["realtime"] = pace.summary()
-        told["messages"] = master.messages.kept
+            result.pace = stated["realtime"] = pace.summary()
+        stated["messages"] = master.messages.kept
         if result.message:
-            told["message"] = result.message
-        told["status"] = result.status
+            stated["message"] = result.message
+        stated["status"] = result.status
         with writing(result):
-            update_json(folder / logs.SIDECAR, sidecar, told)
+            update_json(folder / logs.SIDECAR, sidecar, stated)
     return result, recorder

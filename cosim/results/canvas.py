@@ -42,13 +42,13 @@ class DrawnRun(NamedTuple):
         label: in legends.
         log: the columns that the picture needs, without rows that cannot be drawn.
         line: matplotlib's properties of its lines.
-        told: its columns, the part that metrics cover, and its ship, as far as these are known.
+        stated: its columns, the part that metrics cover, and its ship, as far as these are known.
     """
 
     label: str
     log: Log
     line: dict[str, Any]
-    told: RunOptions
+    stated: RunOptions
 
 
 Runs = Sequence[DrawnRun]

@@ -68,7 +68,7 @@ PICTURES = {
 def draw(
     runs: Mapping[str, Log],
     folder: str | Path,
-    told: Mapping[str, RunOptions] = NOTHING,
+    stated: Mapping[str, RunOptions] = NOTHING,
     options: PictureOptions = USUAL,
 ) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
@@ -76,8 +76,8 @@ def draw(
     Args:
         runs: label -> log; several logs are laid over each other.
         folder: for the files, made when missing.
-        told: label -> its columns, the part that its metrics cover, and its ship, where these are known;
-            see :func:`~cosim.results.read_options`.
+        stated: label -> its columns, the part that its metrics cover, and its ship, where known; see
+            :func:`~cosim.results.read_options`.
         options: format, size and style.
 
     Returns:
@@ -90,7 +90,7 @@ def draw(
     folder = Path(folder)
     written = []
     with options.applied():
-        for name, figure in figures(runs, told):
+        for name, figure in figures(runs, stated):
             folder.mkdir(parents=True, exist_ok=True)
             file = folder / f"{name}.{options.format}"
             save(options.sized(figure), file, options.dpi)
@@ -100,7 +100,7 @@ def draw(
 
 def figures(
     runs: Mapping[str, Log],
-    told: Mapping[str, RunOptions] = NOTHING,
+    stated: Mapping[str, RunOptions] = NOTHING,
     names: Sequence[str] = tuple(PICTURES),
 ) -> "Iterator[tuple[str, Figure]]":
     """Name and figure of the pictures for which at least one log has the columns; see :func:`draw`."""
@@ -108,7 +108,7 @@ def figures(
         picture = PICTURES[name]
         able: list[DrawnRun] = []
         for k, (label, log) in enumerate(runs.items()):
-            own = told.get(label, RunOptions())
+            own = stated.get(label, RunOptions())
             part = _usable(log, picture.choices, own)
             if part is not None:
                 named = label.replace("$", r"\$")

@@ -21,8 +21,8 @@ def errors(runs: Runs) -> "Figure":
     """Heading error, cross-track error and distance to the target over time."""
     figure, panels = stacked(3, 1, 7.0)
     for run in runs:
-        x, y, psi = (run.log[name] for name in run.told.roles.pose)
-        target = [run.log[name] for name in run.told.roles.target]
+        x, y, psi = (run.log[name] for name in run.stated.roles.pose)
+        target = [run.log[name] for name in run.stated.roles.target]
         plot(panels[0, 0], run, np.degrees(wrap(psi - target[2])))
         plot(panels[1, 0], run, cross_track(x, y, target))
         plot(panels[2, 0], run, distance(run))
@@ -36,25 +36,28 @@ def errors(runs: Runs) -> "Figure":
 
 def distance(run: DrawnRun) -> np.ndarray:
     """Distance of the ship to its target [m]."""
-    (x, y, _), (x_t, y_t, _) = run.told.roles.pose, run.told.roles.target
+    (x, y, _), (x_t, y_t, _) = run.stated.roles.pose, run.stated.roles.target
     return np.hypot(run.log[x] - run.log[x_t], run.log[y] - run.log[y_t])
 
 
 def commands(runs: Runs) -> "Figure":
     """Commands of the actuators with their limits, speed, and heading wanted and reached."""
-    limits = {name: each for run in runs for name, each in run.told.commands.items()}
+    limits = {name: each for run in runs for name, each in run.stated.commands.items()}
     figure, panels = stacked(len(limits) + 2, 1, 1.0 + 1.6 * (len(limits) + 2))
     *each, speed, heading = panels.flat
     for run in runs:
         for panel, name in zip(each, limits, strict=True):
-            if name in run.told.commands:
-                low, high, unit = run.told.commands[name]
+            if name in run.stated.commands:
+                low, high, unit = run.stated.commands[name]
                 factor = np.degrees(1.0) if unit == "rad" else 1.0
                 plot(panel, run, factor * run.log[name])
                 for end in (low, high):
                     panel.axhline(factor * end, color="0.4", linewidth=0.8, dashes=(5, 4), zorder=1)
-        plot(speed, run, np.hypot(*(run.log[name] for name in run.told.roles.velocity[:2])))
-        psi, wanted = np.unwrap(run.log[run.told.roles.pose[2]]), run.log.get(run.told.roles.target[2])
+        plot(speed, run, np.hypot(*(run.log[name] for name in run.stated.roles.velocity[:2])))
+        psi, wanted = (
+            np.unwrap(run.log[run.stated.roles.pose[2]]),
+            run.log.get(run.stated.roles.target[2]),
+        )
         plot(heading, run, np.degrees(psi))
         if wanted is not None:
             target = np.degrees(psi + wrap(wanted - psi))
@@ -85,7 +88,7 @@ def metrics(runs: Runs) -> "Figure":
     """The integral metrics over time."""
     figure, panels = stacked(3, 2, 6.5)
     for run in runs:
-        grown = over_time(run.log, run.told.start, run.told.stop, run.told.roles)
+        grown = over_time(run.log, run.stated.start, run.stated.stop, run.stated.roles)
         for panel, (name, _) in zip(panels.flat, GROWING, strict=True):
             plot(panel, run._replace(log=grown), grown[name])
     for panel, (_, label) in zip(panels.flat, GROWING, strict=True):
@@ -104,12 +107,12 @@ def forces(runs: Runs) -> "Figure":
     parts = [
         part
         for part in every
-        if any(np.any(run.log[name] != 0.0) for run in runs for name in run.told.roles.of(part[1]))
+        if any(np.any(run.log[name] != 0.0) for run in runs for name in run.stated.roles.of(part[1]))
     ] or [every[-1]]
     figure, panels = stacked(len(parts), 1, 1.0 + 1.85 * len(parts))
     for panel, (title, role) in zip(panels.flat, parts, strict=True):
         for run in runs:
-            plot(panel, run, _norm(run.log, run.told.roles.of(role)))
+            plot(panel, run, _norm(run.log, run.stated.roles.of(role)))
         panel.set_ylabel(f"{title} ‖τ‖ [N]")
         panel.set_ylim(bottom=0.0)
     return finish(figure, panels, runs)
@@ -120,10 +123,10 @@ def missing_force(run: DrawnRun) -> list[np.ndarray]:
 
     Of the latter only where the log tells it.
     """
-    hull = [run.log[name] for name in run.told.roles.model_error]
-    if not all(name in run.log for name in run.told.roles.of("force", "acting_force")):
+    hull = [run.log[name] for name in run.stated.roles.model_error]
+    if not all(name in run.log for name in run.stated.roles.of("force", "acting_force")):
         return hull
-    pairs = zip(run.told.roles.acting_force, run.told.roles.force, strict=True)
+    pairs = zip(run.stated.roles.acting_force, run.stated.roles.force, strict=True)
     lost = [run.log[acting] - run.log[commanded] for acting, commanded in pairs]
     return [a + b for a, b in zip(hull, lost, strict=True)]
 
@@ -135,7 +138,7 @@ def model_error(runs: Runs) -> "Figure":
         if len(runs) > 1:
             column[0].set_title(run.label, fontsize=10)
         for panel, true, estimate in zip(
-            column, missing_force(run), run.told.roles.estimate, strict=True
+            column, missing_force(run), run.stated.roles.estimate, strict=True
         ):
             # The thin black line stays visible on the estimate, and the estimate around it.
             plot(panel, run, true, color="black", linestyle="-", linewidth=0.9, zorder=3)

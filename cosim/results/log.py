@@ -306,5 +306,5 @@ def log_frame(folder: str | Path) -> "pandas.DataFrame":
     except (OSError, ValueError, KeyError):
         columns = {}
     for kind in ("unit", "description"):
-        frame.attrs[f"{kind}s"] = {name: told.get(kind, "") for name, told in columns.items()}
+        frame.attrs[f"{kind}s"] = {name: stated.get(kind, "") for name, stated in columns.items()}
     return frame

@@ -60,12 +60,12 @@ def default_folder(name: str, description: Mapping[str, Any], overwrite: bool = 
 
 def _input(description: Mapping[str, Any]) -> Any:
     """What decides the result of a run: the scenario as it was understood, and the FMUs."""
-    told = json.loads(json.dumps(description))
-    if not isinstance(told, dict) or "scenario" not in told:
+    stated = json.loads(json.dumps(description))
+    if not isinstance(stated, dict) or "scenario" not in stated:
         return None
-    scenario = {k: v for k, v in told["scenario"].items() if k != "log"}
+    scenario = {k: v for k, v in stated["scenario"].items() if k != "log"}
     # Where an FMU lies does not matter: archives are unpacked to another folder each time.
     for entry in scenario.get("fmus", {}).values():
         entry.pop("path", None)
-    hashes = {name: fmu["sha256"] for name, fmu in told.get("fmus", {}).items()}
+    hashes = {name: fmu["sha256"] for name, fmu in stated.get("fmus", {}).items()}
     return scenario, hashes

@@ -37,16 +37,16 @@ class RunOptions(NamedTuple):
 def read_options(folder: Path) -> RunOptions:
     """Options of the run in a result folder; the defaults where its ``log.json`` does not state them."""
     try:
-        told = json.loads((folder / SIDECAR).read_text())
-        scenario, window = told["scenario"], told["scenario"]["metrics"]
+        stated = json.loads((folder / SIDECAR).read_text())
+        scenario, window = stated["scenario"], stated["scenario"]["metrics"]
         roles = Roles.model_validate(scenario.get("roles", {}))
-        outline = AnnotatedOutline.read(told.get("ship") or {})
-        trial = told.get("trial") and AnnotatedTrial(
-            str(told["trial"]["kind"]), str(told["trial"]["order"])
+        outline = AnnotatedOutline.read(stated.get("ship") or {})
+        trial = stated.get("trial") and AnnotatedTrial(
+            str(stated["trial"]["kind"]), str(stated["trial"]["order"])
         )
         commands = {
             str(name): CommandLimit(float(each["low"]), float(each["high"]), str(each["unit"]))
-            for name, each in told.get("commands", {}).items()
+            for name, each in stated.get("commands", {}).items()
         }
         ship = scenario.get("ship")
         return RunOptions(window["from"], window["to"], roles, outline, ship, trial or None, commands)

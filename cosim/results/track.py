@@ -95,7 +95,7 @@ def outlines(run: DrawnRun, outline: AnnotatedOutline, scale: float) -> np.ndarr
     rows = np.searchsorted(time, np.linspace(time[0], time[-1], OUTLINES)).clip(0, time.size - 1)
     drawn: list[np.ndarray] = []
     length = scale * outline.length
-    for pose in np.stack([run.log[name][rows] for name in run.told.roles.pose], axis=1):
+    for pose in np.stack([run.log[name][rows] for name in run.stated.roles.pose], axis=1):
         if not any(np.all(np.abs(pose - other) < (length, length, 1.0)) for other in drawn):
             drawn.append(pose)
     return hulls(np.array(drawn), scale * np.array(outline.corners))
@@ -114,8 +114,10 @@ def trajectory(runs: Runs) -> "Figure":
     """
     from matplotlib.collections import PolyCollection
 
-    paths = [_path(run, run.told.roles.pose) for run in runs]
-    targets = [_path(run, run.told.roles.target) for run in runs if run.told.roles.target[0] in run.log]
+    paths = [_path(run, run.stated.roles.pose) for run in runs]
+    targets = [
+        _path(run, run.stated.roles.target) for run in runs if run.stated.roles.target[0] in run.log
+    ]
     norths, easts = zip(*paths, *targets, strict=True)
     (north, tall), (east, wide) = _limits(norths), _limits(easts)
     size = max(tall, wide, STILL)
@@ -139,14 +141,14 @@ def trajectory(runs: Runs) -> "Figure":
         ylim=(north - 0.5 * tall, north + 0.5 * tall),
         aspect="equal",
     )
-    longest = max((run.told.outline.length for run in runs if run.told.outline), default=0.0)
+    longest = max((run.stated.outline.length for run in runs if run.stated.outline), default=0.0)
     scale = next((s for s in SCALES if s * longest < OUTLINE_SHARE * size), SCALES[-1])
     for run, path in zip(runs, paths, strict=True):
         x, y = _along(*path, size / 1000.0)
         panel.plot(y, x, label=run.label, **{**run.line, "linewidth": 1.8})
-        if run.told.outline is not None:
+        if run.stated.outline is not None:
             ships = PolyCollection(
-                list(outlines(run, run.told.outline, scale)),
+                list(outlines(run, run.stated.outline, scale)),
                 facecolors=(run.line["color"], 0.15 / len(runs)),
                 edgecolors=run.line["color"],
                 linewidths=0.7,
@@ -167,8 +169,8 @@ def trajectory(runs: Runs) -> "Figure":
         _target(panel, targets, size)
     period = (runs[0].log["time"][-1] - runs[0].log["time"][0]) / (OUTLINES - 1)
     ratio = "full length" if scale == 1.0 else f"1:{1.0 / scale:g}"
-    told = f"ships drawn {ratio}, every {period:.3g} s" if longest else ""
-    panel.set_title(told, loc="right", fontsize=8, color="0.4")
+    stated = f"ships drawn {ratio}, every {period:.3g} s" if longest else ""
+    panel.set_title(stated, loc="right", fontsize=8, color="0.4")
     legend(figure, panel, len(runs) + 2)
     return arrange(figure)
 

@@ -75,24 +75,24 @@ def _remove_unfinished() -> None:
 
 def _complete(folder: Path, status: str, message: str) -> tuple[int, str]:
     """Put log.csv and log.json right; returns the number of rows, and what happened."""
-    told: dict[str, Any] = {"rows": 0, "message": message, "status": status}
+    stated: dict[str, Any] = {"rows": 0, "message": message, "status": status}
     if not STATE.numbers[LOGGING]:
         if (
             status == "interrupted"
         ):  # before its first row: an earlier run stays, as where it ends in order
             return 0, message
         clear_results(folder)
-        write_json(folder / SIDECAR, {**json.loads(STATE.read(DESCRIPTION)), **told})
+        write_json(folder / SIDECAR, {**json.loads(STATE.read(DESCRIPTION)), **stated})
         return 0, message
     content = json.loads((folder / SIDECAR).read_text(encoding="utf-8"))
-    if content.get("status") not in ("running", "done"):  # the run itself has told how it ended
+    if content.get("status") not in ("running", "done"):  # the run itself has reported how it ended
         return int(content.get("rows", 0)), content.get("message", message)
     try:
-        told["rows"] = rescue(folder / CSV)
+        stated["rows"] = rescue(folder / CSV)
     except OSError:
-        told["rows"] = cut_to_rows(folder / CSV)
-    update_json(folder / SIDECAR, content, told)
-    return told["rows"], message
+        stated["rows"] = cut_to_rows(folder / CSV)
+    update_json(folder / SIDECAR, content, stated)
+    return stated["rows"], message
 
 
 def _shown(folder: str) -> str:

@@ -48,7 +48,7 @@ def _own_fmus(names: Sequence[str], scenario: Scenario, warnings: list[str]) -> 
 
 
 def builder_options(scenario: Scenario, native: bool) -> list[str]:
-    """What the builder is told of the FMUs of a scenario.
+    """What the builder gets of the FMUs of a scenario.
 
     Args:
         scenario: names the ship.

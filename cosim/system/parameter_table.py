@@ -16,7 +16,7 @@ from ..fmu.fmu_model import FmuVariable
 
 @contextmanager
 def opened_table(path: Path, what: str) -> Iterator[Any]:
-    """The reader of a CSV file; errors while it reads are told of the file, by ``what`` that is."""
+    """The reader of a CSV file; errors while it reads name the file, by ``what`` that is."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             yield csv.reader(file, skipinitialspace=True)

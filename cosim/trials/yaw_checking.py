@@ -6,7 +6,7 @@ import numpy as np
 
 from .ship_passage import Passage, approach_speed, executes, first_crossing
 
-MOST_OVERSHOOTS = 4  # that are told; the resolution has limits for two
+MOST_OVERSHOOTS = 4  # that are reported; the resolution has limits for two
 
 
 def zigzag_measures(p: Passage, length: float) -> dict[str, float]:

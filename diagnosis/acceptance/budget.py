@@ -75,8 +75,8 @@ def read_learned(folder: str | Path) -> Learned:
     """
     path, other = Path(folder) / "diagnosis.json", Path(folder) / "posterior.json"
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))["unrecorded"]
-        size, time = (np.array(told[key], float).reshape(3) for key in ("size", "time"))
+        stated = json.loads(path.read_text(encoding="utf-8"))["unrecorded"]
+        size, time = (np.array(stated[key], float).reshape(3) for key in ("size", "time"))
         rest = json.loads(other.read_text(encoding="utf-8")) if other.exists() else {"names": []}
         some, learned_from = rest["names"], fingerprints(rest.get("learned_from", []), other)
     except OSError as error:

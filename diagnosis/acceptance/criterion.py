@@ -118,9 +118,9 @@ class Criterion(BaseModel):
             f"{s} from {low:g} to {high:g} {MOTION.get(s, '(SI)')}"
             for s, (low, high) in self.operating_range.items()
         ]
-        told = [] if self.runs is None else [f"only runs {', '.join(self.runs)}"]
-        told += [f"only windows with a mean of {' and '.join(limits)}"] if limits else []
-        return told + ["training runs of the model count"] * self.training_runs
+        stated = [] if self.runs is None else [f"only runs {', '.join(self.runs)}"]
+        stated += [f"only windows with a mean of {' and '.join(limits)}"] if limits else []
+        return stated + ["training runs of the model count"] * self.training_runs
 
 
 Text = Annotated[str, Field(min_length=1, max_length=1000)]  # chosen: a paragraph

@@ -130,18 +130,18 @@ def judge(
     every = np.concatenate(off)
     offset = np.array([np.mean(x) for x in rotate_to_body(psi, every[:, 0], every[:, 1])])
     sources, masks = [p.sources for p, _ in chosen], [rows for _, rows in chosen]
-    told = budget(c.quantity, sources, masks)
+    stated = budget(c.quantity, sources, masks)
     n = independent(np.abs(errors), run)
-    outcome, reason, interval = decide(c, errors, n, told.u_val)
-    if outcome == "met" and told.unknown:
-        reason += f"; u_val leaves out what is not known: {', '.join(told.unknown)}"
+    outcome, reason, interval = decide(c, errors, n, stated.u_val)
+    if outcome == "met" and stated.unknown:
+        reason += f"; u_val leaves out what is not known: {', '.join(stated.unknown)}"
     flags = [
         _too_good(q, judged(q, every), n, budget(q, sources, masks)) for q in ("position", "heading")
     ]
     flags.append(_too_early(c, np.concatenate([p.predictions.after[rows] for p, rows in chosen])))
     if any(p.learned for p, _ in chosen):
         flags.append("Training runs of the model count, as the criterion states.")
-    found = JudgedErrors(run, errors, offset, n, interval, told)
+    found = JudgedErrors(run, errors, offset, n, interval, stated)
     return Judgement(c, outcome, reason, counts, found, [*filter(None, flags)], chosen)
 
 

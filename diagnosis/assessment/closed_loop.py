@@ -87,21 +87,21 @@ def closed_loop(
     path = LoopPart(serving(reference.guidance), {})
     observer = LoopPart(serving(mdf.COMPONENT), reference.observer)
     controller = LoopPart(serving(adaptive.COMPONENT), {})
-    drive, told = LoopPart(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
+    drive, stated = LoopPart(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
     pushed = model.ship.vessel.inputs
     s, vessel = ship.begin(pushed())
     g, target = path.begin(Nothing())
     measured = ObserverInputs(vessel.measured, Force())
     o, estimate = observer.begin(measured)
     c, _ = controller.begin(ControllerInputs(estimate, target))
-    t, _ = drive.begin(told())
+    t, _ = drive.begin(stated())
     late = max(1, 1 + round(model.clock / h_path))
     first = ClosedLoop((s, g, o, c, t), vessel.velocity, target, estimate, (vessel.measured,) * late)
 
     def step(now: ClosedLoop, h: float) -> tuple[ClosedLoop, Number]:
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
-        t, thrust = drive.advance(t, told(demand.tau, now.velocity), h)
+        t, thrust = drive.advance(t, stated(demand.tau, now.velocity), h)
         acting = pushed(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
         s, vessel = ship.advance(s, acting, h_path)
         g, target = path.advance(g, Nothing(), h_path)

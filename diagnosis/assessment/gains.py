@@ -32,21 +32,21 @@ class ThrustGains:
 
     Attributes:
         value, error: (3,), k and its standard error.
-        told: (3,), whether the commands of that axis explain most of what all else leaves of its
+        stated: (3,), whether the commands of that axis explain most of what all else leaves of its
             inertial force, and follow neither from those of another axis nor from the motion.
     """
 
     value: np.ndarray
     error: np.ndarray
-    told: np.ndarray
+    stated: np.ndarray
 
     @property
     def wrong(self) -> np.ndarray:
         """(3,), axes whose k no ship has; where all are less, it is a clock or a unit."""
         most, off = SETTINGS.most_gain, FAR_OFF * self.error
         low, high = self.value - off, self.value + off
-        weak = (self.told & (high < 1.0 / most))[np.isfinite(self.value)]
-        return self.told & ((low > most) | (high < SETTINGS.least_gain) | weak.all())
+        weak = (self.stated & (high < 1.0 / most))[np.isfinite(self.value)]
+        return self.stated & ((low > most) | (high < SETTINGS.least_gain) | weak.all())
 
     @property
     def mean(self) -> float | None:
@@ -68,11 +68,13 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
     moves = T.std(axis=0) > DIGITS * np.abs(T).max()
     surroundings = other_forces(w, a, z)
     value, error = np.full((2, 3), np.nan)
-    left, told = np.zeros_like(a), np.zeros(3, bool)
+    left, stated = np.zeros_like(a), np.zeros(3, bool)
     for j in np.flatnonzero(moves):
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
         x = np.column_stack([T[:, j], *others, surroundings[j]])
-        few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
+        few = (
+            len(a) < OVERLAP * x.shape[1]
+        )  # of fewer independent windows than unknowns nothing is known
         if few or not np.isfinite(x).all() or _own(T[:, j], others) < MEASURED**2:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
@@ -85,8 +87,8 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         # With less explained than all else leaves, it is not T that moves the ship; with less than a
         # model lacks that is not exact, T follows from the motion, as under feedback of the velocity.
         least = max(unexplained, MEASURED**2 * (a[:, j] @ a[:, j]))
-        told[j] = beta[0] ** 2 * own > least
-    return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
+        stated[j] = beta[0] ** 2 * own > least
+    return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), stated)
 
 
 def other_forces(w: WeakWindows, a: np.ndarray, z: np.ndarray) -> list[np.ndarray]:

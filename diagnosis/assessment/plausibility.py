@@ -217,7 +217,7 @@ def pace_of(w: WeakWindows, model: Model) -> float:
     for _ in range(2 * STEPS):
         slow = model.plus({name: lag * (1.0 / pace - 1.0) for name, lag in model.lags.items()})
         given = gains(w, slow)
-        factor = given.mean_of(given.told)
+        factor = given.mean_of(given.stated)
         if factor is None:
             break
         pace = float(np.sqrt(pace * np.sqrt(factor)))

@@ -180,7 +180,7 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     for who, factors in {tuple(f.tolist()): (who, f) for who, f in reversed(signs.items())}.values():
         if (factors < 0.0).any():
             yield of_commands(f"{who} the wrong sign", factors.tolist(), names)
-    units = [run.layout.column(s).unit for s in names]  # columns of different ones are told apart
+    units = [run.layout.column(s).unit for s in names]  # columns of different ones are distinguished
     pairs = ((i, k) for i, k in combinations(range(len(names)), 2) if units[i] == units[k])
     yield from (swapped(names, *pair) for pair in pairs)
     largest = np.abs(commands).max(axis=0)

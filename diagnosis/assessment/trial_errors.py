@@ -85,11 +85,11 @@ def _measures(p: Passage, trial: str, ship: Ship) -> Mapping[str, float]:
 
 
 def _together(found: list[Mapping[str, float]]) -> TrialErrors:
-    told: TrialErrors = {}
+    stated: TrialErrors = {}
     for name in dict.fromkeys(name for each in found for name in each):
         triple = [each.get(name) for each in found]
         if numbered := NUMBERED.fullmatch(name):
-            told.setdefault(numbered[1], []).append(triple)
+            stated.setdefault(numbered[1], []).append(triple)
         else:
-            told[name] = triple
-    return told
+            stated[name] = triple
+    return stated

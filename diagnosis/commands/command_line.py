@@ -266,10 +266,10 @@ def _take_ship_of_logs(options: argparse.Namespace) -> None:
         return
     from ..runs import ship_of_logs  # only now: it takes a second to import
 
-    told = ship_of_logs(_paths(options, RUNS))
-    if told is None:
+    stated = ship_of_logs(_paths(options, RUNS))
+    if stated is None:
         return
-    ship, path = told
+    ship, path = stated
     if "ship" not in options:
         raise InputError(f"'{path}' is of {ship}; this analysis supports {DEFAULT} only")
     complain(f"the ship is {ship}, as '{path}' states; --ship names another one", "note: ")

@@ -223,8 +223,8 @@ class PlanStep(NamedTuple):
 
     def content(self) -> Mapping[str, object]:
         """For a file."""
-        told = {"manoeuvre": self.name, "description": TEXTS[self.name], "seconds": self.seconds}
-        return told | {"heading": self.heading, "numbers": [round(x, 4) for x in self.numbers]}
+        stated = {"manoeuvre": self.name, "description": TEXTS[self.name], "seconds": self.seconds}
+        return stated | {"heading": self.heading, "numbers": [round(x, 4) for x in self.numbers]}
 
 
 def poses(plan: Sequence[PlanStep], seconds: float, h: float, r: Reach) -> np.ndarray:

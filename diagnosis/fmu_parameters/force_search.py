@@ -24,7 +24,7 @@ class Accepted:
     Attributes:
         force: with its coefficient.
         probability: that it is the cause, of all candidates and of none.
-        together: the same of it and of those that cannot be told from it.
+        together: the same of it and of those that cannot be distinguished from it.
         alike: these.
     """
 

@@ -66,14 +66,14 @@ class LinearModel:
     def write(self, folder: Path, units: Mapping[str, str]) -> list[str]:
         """Write ``linear.json`` and ``linear.mat``; returns their names."""
 
-        def told(names: Sequence[str]) -> list[dict[str, object]]:
+        def stated(names: Sequence[str]) -> list[dict[str, object]]:
             return [{"name": n, "unit": units[n], "value": self.at[n]} for n in names]
 
         groups = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
         matrices = {"A": self.A, "B": self.B, "C": self.C, "D": self.D}
         roots = np.linalg.eigvals(self.A) if self.A.size else np.zeros(0)
         content = {
-            **{group: told(names) for group, names in groups.items()},
+            **{group: stated(names) for group, names in groups.items()},
             "x_dot": self.x_dot.tolist(),
             **{name: m.tolist() for name, m in matrices.items()},
             "eigenvalues": [[float(x.real), float(x.imag)] for x in roots],
@@ -143,7 +143,7 @@ def _listed(model: FmuModel) -> list[LinearState]:
 
 
 def _of_ship(found: VariableMap) -> list[LinearState]:
-    start, outputs = found.told("start"), found.told("outputs")
+    start, outputs = found.stated("start"), found.stated("outputs")
     both = [s for s in MOTION if s in start and s in outputs]
     return [LinearState(start[s].name, outputs[s].name, 1) for s in both]
 
@@ -233,8 +233,8 @@ def _exact(
 
     FMI 2.0.4, 2.1.9. Rates that are seen by differences of other variables have no such slopes.
     """
-    told = fmu.model.description.coSimulation
-    if told is None or not told.providesDirectionalDerivative or any(s.order for s in states):
+    stated = fmu.model.description.coSimulation
+    if stated is None or not stated.providesDirectionalDerivative or any(s.order for s in states):
         return None
     variables, instance = fmu.model.variables, fmu.instance()
     try:

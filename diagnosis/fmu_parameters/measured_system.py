@@ -187,8 +187,8 @@ def windows_of(
 
 def step_of(model: FmuModel, period: float) -> float:
     """Length of a step [s], for samples that are a period apart [s]."""
-    own, told = model.suggested_step or period, model.description.coSimulation
-    if told is not None and not told.canHandleVariableCommunicationStepSize:
+    own, stated = model.suggested_step or period, model.description.coSimulation
+    if stated is not None and not stated.canHandleVariableCommunicationStepSize:
         return own * max(1.0, round(period / own))
     return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - 1e-6))))
 

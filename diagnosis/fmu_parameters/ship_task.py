@@ -50,13 +50,13 @@ class ShipTask(CalibrationTask):
         runs: Mapping[str, Sequence[WeakWindows]],
     ) -> None:
         super().__init__(parameters, notes)
-        self.predictor, self.runs, told = predictor, runs, predictor.map.told
+        self.predictor, self.runs, stated = predictor, runs, predictor.map.stated
         self.content = predictor.given.content()
         self.use = {w.run.name: use for use, every in runs.items() for w in every}
         self.driven = predictor.processes.inputs
-        given = {**told("inputs"), **told(DISTURBANCES)}
+        given = {**stated("inputs"), **stated(DISTURBANCES)}
         self.forces_on = [c.name for s, c in given.items() if s in BESIDE]
-        self.outputs = [told("outputs")[s].name for s in MOTION if s in told("outputs")]
+        self.outputs = [stated("outputs")[s].name for s in MOTION if s in stated("outputs")]
         lines = [predictor.lines["outputs"][s] for s in POSE]
         self.lines = np.array([[line.gain for line in lines], [line.offset for line in lines]])
 
@@ -67,9 +67,9 @@ class ShipTask(CalibrationTask):
     @property
     def usual(self) -> dict[str, float]:
         """Of each of these inputs a usual size: that of its commands, else of the ship's full force."""
-        told, found = self.predictor.map, {}
+        stated, found = self.predictor.map, {}
         for group in (DISTURBANCES, "inputs"):
-            for s, c in told.told(group).items():
+            for s, c in stated.stated(group).items():
                 if s in TAU:
                     k = TAU.index(s)
                     every = np.concatenate([w.run.tau_cmd[:, k] for w in self.runs["train"]])
@@ -81,22 +81,22 @@ class ShipTask(CalibrationTask):
     @property
     def possible(self) -> list[AdditionalForce]:
         """Forces that may act in addition: constant in body or earth frame, or of one velocity."""
-        told = self.predictor.map.told("outputs")
-        of_velocity = candidates(self.forces_on, [told[s].name for s in VELOCITY if s in told], ())
+        stated = self.predictor.map.stated("outputs")
+        of_velocity = candidates(self.forces_on, [stated[s].name for s in VELOCITY if s in stated], ())
         return [*of_velocity, *self._earth_forces()]
 
     def _earth_forces(self) -> Iterator[AdditionalForce]:
         """A force to the north, and one to the east, where the FMU has both inputs and a heading."""
-        told, lines = self.predictor.map, self.predictor.lines
+        stated, lines = self.predictor.map, self.predictor.lines
         found = {
             s: (c.name, 1.0 / lines[group][s].gain)
             for group in ("inputs", DISTURBANCES)
-            for s, c in told.told(group).items()
+            for s, c in stated.stated(group).items()
             if s in EARTH["F_n"]
         }
-        if len(found) < len(EARTH["F_n"]) or "psi" not in told.told("outputs"):
+        if len(found) < len(EARTH["F_n"]) or "psi" not in stated.stated("outputs"):
             return
-        heading, line = told.told("outputs")["psi"].name, lines["outputs"]["psi"]
+        heading, line = stated.stated("outputs")["psi"].name, lines["outputs"]["psi"]
         for name, angles in EARTH.items():
             parts = tuple((*found[s], line.offset + angle) for s, angle in angles.items())
             direction = EarthDirection(name, heading, line.gain, parts)
@@ -134,7 +134,7 @@ class ShipTask(CalibrationTask):
         sure = dict(zip(MOTION, [*s.eta_std[row], *s.nu_std[row]], strict=True))
         std = {
             c.name: float(sure[signal]) / abs(p.lines["start"][signal].gain)
-            for signal, c in p.map.told("start").items()
+            for signal, c in p.map.stated("start").items()
             if signal in sure and not p.whole
         }
         onto = s.eta[rows[0]] if p.placed else None
@@ -178,11 +178,11 @@ def ship_task(
     ends = np.cumsum([0, *(len(each) for each in paths.values())])
     runs = {use: gathered[a:b] for use, a, b in zip(paths, ends[:-1], ends[1:], strict=True)}
     predictor = fmu.begun_on(gathered)
-    told = predictor.map
-    if not set(POSE) <= told.told("outputs").keys():
+    stated = predictor.map
+    if not set(POSE) <= stated.stated("outputs").keys():
         raise InputError(f"'{fmu.name}' needs outputs for x, y and psi to calibrate its parameters")
     groups = ("inputs", "outputs", "start", DISTURBANCES)
-    mapped = {c.name for g in groups for c in told.told(g).values()}
+    mapped = {c.name for g in groups for c in stated.stated(g).values()}
     chosen, notes = chosen_parameters(getattr(options, "parameters", None), fmu.model, mapped)
     if not chosen:
         raise InputError(f"'{fmu.name}' has no parameter that can be calibrated")

@@ -172,9 +172,9 @@ class BlackBox(ABC):
 
     def description(self) -> PredictorDescription:
         waits = {w.run.name: self.run_in(w.smoothed) for w in self.runs}
-        told = [*self._sentences(max(waits.values()))]
+        stated = [*self._sentences(max(waits.values()))]
         return PredictorDescription(
-            self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told
+            self.kind, self.name, self.sha256, self.given_map, self.whole, waits, stated
         )
 
     def in_windows(self) -> Predictor:
@@ -183,8 +183,8 @@ class BlackBox(ABC):
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
     ) -> list[str]:
-        told = f"The findings are not written: {self.name} has no parameters."
-        return [] if learned is None else [told]
+        stated = f"The findings are not written: {self.name} has no parameters."
+        return [] if learned is None else [stated]
 
     def _sentences(self, wait: float) -> Iterator[str]:
         if not self.whole:

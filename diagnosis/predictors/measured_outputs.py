@@ -39,7 +39,7 @@ def rms(w: WeakWindows, model: Model, name: str) -> float:
 
 def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
     """What the commands of some runs leave open between thrust and resistance, a sentence each."""
-    told = []
+    stated = []
     for a in actuators(model.ship.description):
         shafts = [a.first + k for k, c in enumerate(a.law.commands) if c.unit == "1/s"]
         given = [w.run.commands for w in runs if w.run.commands is not None]
@@ -48,8 +48,8 @@ def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
         speed = np.concatenate([commands[:, shafts[0]] for commands in given])
         if speed.std() > SHARE_OF_COMMAND * abs(speed.mean()) or not speed.any():
             continue
-        told.append(
+        stated.append(
             f"The {a.part.title} turns at {speed.mean():.3g} 1/s throughout: motion alone cannot "
             "discriminate its thrust from the resistance of the hull; run other shaft speeds."
         )
-    return told
+    return stated

@@ -29,7 +29,7 @@ from ..runs import fingerprints
 from .ship_model import Model
 
 MEASUREMENT, THRUSTERS = "measurement", "thrusters"
-# What a tool is told of a parameter that no FMU has.
+# What a tool gets of a parameter that no FMU has.
 NO_FMU = "of the measurement system: no FMU has this parameter; a scenario has a fault instead"
 
 
@@ -75,13 +75,13 @@ def _told(
     part: str, values: Mapping[str, float], declared: Mapping[str, Variable]
 ) -> dict[str, Parameter]:
     """What differs from the nominal values of a part of the ship, for a file."""
-    told = {}
+    stated = {}
     for name, value in values.items():
         v = _find(name, declared, f"{part}.{name}")
         if _within(float(value), v, f"{part}.{name}") != v.start:
             text = f"{v.description}; {NO_FMU}" if part == MEASUREMENT else v.description
-            told[name] = Parameter(float(value), v.unit, text)
-    return told
+            stated[name] = Parameter(float(value), v.unit, text)
+    return stated
 
 
 def ship_with(files: Sequence[Path], name: str | Path | None = None) -> Ship:

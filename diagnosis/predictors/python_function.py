@@ -94,8 +94,8 @@ class FunctionPredictor(BlackBox):
         if (wrong := sound & ~np.isfinite(found).all(axis=1)).any():
             k = int(np.argmax(wrong))
             at = ", ".join(f"{name} = {signals[name][k]:.4g}" for name in ("u", "v", "r"))
-            told = ", ".join(f"{x:g}" for x in found[k])
-            raise InputError(f"'{self.name}' gives the accelerations {told} in a measured state: {at}")
+            stated = ", ".join(f"{x:g}" for x in found[k])
+            raise InputError(f"'{self.name}' gives the accelerations {stated} in a measured state: {at}")
         return found
 
     def answer(self, state: vessel.State, commands: Signals) -> list[np.ndarray]:
@@ -105,8 +105,8 @@ class FunctionPredictor(BlackBox):
             InputError: the function fails, or returns anything else.
         """
         try:
-            told = self.source.function(state, commands)
-            found = [np.broadcast_to(np.asarray(x, float), state.u.shape) for x in told]
+            stated = self.source.function(state, commands)
+            found = [np.broadcast_to(np.asarray(x, float), state.u.shape) for x in stated]
         except Exception as error:
             raise InputError(f"'{self.name}' fails: {error!r}") from error
         if len(found) != 3:

@@ -128,10 +128,10 @@ class Model:
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")
-        told = {
+        stated = {
             f"{part}.{n}": x for part in dict.fromkeys(parts) for n, x in getattr(self, part).items()
         }
-        values = ", ".join(f"{name} = {x:.4g}" for name, x in told.items())
+        values = ", ".join(f"{name} = {x:.4g}" for name, x in stated.items())
         runs = f"; values of {', '.join(self.runs)}" if self.runs else ""
         return f"<model: {values or 'nominal'}{runs}>"
 

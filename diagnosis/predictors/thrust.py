@@ -148,7 +148,7 @@ class Response:
         """Means (2, k, n) from each sample to the next: commands that arrive, shares that act.
 
         Where these are the same there is one of them. Where forces are not in proportion to what acts,
-        and that changes from sample to sample, it is told at two points of Gauss' rule. In fewer rows
+        and that changes from sample to sample, it counts at two points of Gauss' rule. In fewer rows
         those of a shaft have the mean squares of both halves.
 
         Args:

@@ -74,9 +74,9 @@ class ReportedEffect:
 def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedEffect]]:
     """The effects that are reported as found, and those that are only possible."""
     found, possible = [], []
-    for f, share, unique, told in zip(d.learned.effects, d.shares, d.unique, d.believed, strict=True):
+    for f, share, unique, stated in zip(d.learned.effects, d.shares, d.unique, d.believed, strict=True):
         fitted = d.start.ship.effects[f.id].search.by == "regression"
-        (found if told else possible).append(_reported(d, f, share, unique, told or fitted))
+        (found if stated else possible).append(_reported(d, f, share, unique, stated or fitted))
     for f in d.dropped:
         fitted = all(is_fitted(d, n) for n in f.values)
         possible.append(_reported(d, _as_fitted(d, f) if fitted else f, f.share, None, fitted))
@@ -97,7 +97,7 @@ def further_fitted_values(d: Diagnosis) -> list[str]:
 
     An angle that matters in no manoeuvre is left out, and what is within its own uncertainty.
     """
-    told, learned, std = [], d.learned.model, d.posterior.std
+    stated, learned, std = [], d.learned.model, d.posterior.std
     nominal = d.start.ship.coefficients
     for effect in d.start.ship.effects.values():
         values = {n: learned.value(n) for n in effect.coefficients if n not in nominal}
@@ -107,8 +107,8 @@ def further_fitted_values(d: Diagnosis) -> list[str]:
             for n, x in values.items()
         )
         if effect.kind != "force" and known:
-            told.append(sentence(Found(effect, values, d.speeds)))
-    return told
+            stated.append(sentence(Found(effect, values, d.speeds)))
+    return stated
 
 
 def is_fitted(d: Diagnosis, name: str) -> bool:
@@ -168,15 +168,15 @@ def _plain(name: str, f: Finding) -> str:
 def _sentence(d: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
     """A finding in words; what holds in single runs, one after the other, of the first ones."""
 
-    def told(own: Mapping[str, float]) -> str:
+    def stated(own: Mapping[str, float]) -> str:
         return sentence(Found(d.start.ship.effects[f.id], own, d.speeds))
 
     shown = _shown(d, values)
     runs = [run for run in f.of_runs if shown is values]
-    each = [f"Run {run}: {told(of_one_run(values, run))}" for run in runs[:SHOWN]]
+    each = [f"Run {run}: {stated(of_one_run(values, run))}" for run in runs[:SHOWN]]
     if more := len(runs[SHOWN:]):
         each.append(f"diagnosis.json has {more} more.")
-    said = " ".join(each) or told(shown)
+    said = " ".join(each) or stated(shown)
     return said + of_whole_hull(f, d.start, d.learned.model, d.speeds)
 
 

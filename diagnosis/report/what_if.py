@@ -246,9 +246,9 @@ class MovableModel:
         effects, done = self.start.ship.effects, set[str]()
         for e in self.r.accepted:
             done.add(e.id)
-            told = {n: c.value for n, c in e.coefficients.items()}
+            stated = {n: c.value for n, c in e.coefficients.items()}
             note = "found" if e in self.r.effects else "possibility"
-            yield self._choice(effects[e.id], note, told, e.in_model)
+            yield self._choice(effects[e.id], note, stated, e.in_model)
         prior = NominalPrior.of(self.start, self.diagnosis.prior)
         # Terms that a calibration fits in addition to the ship's coefficients.
         for effect in effects.values():
@@ -265,7 +265,7 @@ class MovableModel:
                 slider = self._slider(name, self.learned.value(name), std)
                 yield Choice(name, False, "", slider.before != slider.after, *self._movable([slider]))
 
-    def _choice(self, effect: Effect, note: str, told: dict[str, float], in_model: bool) -> Choice:
+    def _choice(self, effect: Effect, note: str, stated: dict[str, float], in_model: bool) -> Choice:
         """An effect with its values: those of the model that has it, else those that are reported."""
         free = [p.name for p in effect.parameters if p.name not in effect.settings]
         single = {p for own in self.learned.runs.values() for p in own}
@@ -276,7 +276,9 @@ class MovableModel:
         for name in (*(n for n in free if n not in single), *of_runs):
             present = self.start.value(name)
             given = (
-                told.get(name, 0.0) + present if name in effect.coefficients else told.get(name, present)
+                stated.get(name, 0.0) + present
+                if name in effect.coefficients
+                else stated.get(name, present)
             )
             sliders.append(self._slider(name, self.learned.value(name) if in_model else given, None))
         return Choice(effect.id, True, note, in_model, *self._movable(sliders))

@@ -112,10 +112,10 @@ def _part(path: Path) -> _Part:
     table = whole.columns({*columns, found.name})
     cells = table[found.name]
     stamp = set(fields[found.name].columns) if found.name in fields else set()
-    told = dict(zip(names, units, strict=True))
+    reported = dict(zip(names, units, strict=True))
     table = table.filter(items=[name for name in columns if name not in {*stamp, found.name}])
     table, cells = _by_names(table, cells)
-    table = table.rename(columns={n: f"{n} [{told[n]}]" for n in table if told.get(n)})
+    table = table.rename(columns={n: f"{n} [{reported[n]}]" for n in table if reported.get(n)})
     return _Part(table, cells, found, path)
 
 

@@ -57,11 +57,13 @@ class Fingerprint:
         return cls(run.name, own, period, course / unit, certain)
 
     @classmethod
-    def read(cls, told: Mapping[str, Any]) -> "Fingerprint":
+    def read(cls, stated: Mapping[str, Any]) -> "Fingerprint":
         """That of :meth:`content`; a ValueError, KeyError or TypeError where it is none."""
-        course = np.frombuffer(b64decode(told["course"], validate=True), np.int8).reshape(-1, 3) / 127.0
-        certain = np.array(told["certain"], float).reshape(3)
-        return cls(str(told["name"]), str(told["sha256"]), float(told["period"]), course, certain)
+        course = (
+            np.frombuffer(b64decode(stated["course"], validate=True), np.int8).reshape(-1, 3) / 127.0
+        )
+        certain = np.array(stated["certain"], float).reshape(3)
+        return cls(str(stated["name"]), str(stated["sha256"]), float(stated["period"]), course, certain)
 
     def content(self) -> dict[str, Any]:
         """What JSON can hold of it."""
@@ -83,14 +85,14 @@ class Fingerprint:
         return float(np.median([*_pieces(short, long)] or [0.0])) > SAME
 
 
-def fingerprints(told: Iterable[Mapping[str, Any]], where: Path) -> tuple[Fingerprint, ...]:
+def fingerprints(stated: Iterable[Mapping[str, Any]], where: Path) -> tuple[Fingerprint, ...]:
     """Those that a file tells.
 
     Raises:
         InputError: one is none.
     """
     try:
-        return tuple(map(Fingerprint.read, told))
+        return tuple(map(Fingerprint.read, stated))
     except (ValueError, KeyError, TypeError):
         raise InputError(f"'{where}': its list of training runs is damaged") from None
 

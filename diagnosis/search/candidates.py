@@ -194,8 +194,8 @@ def spread(e: Effect) -> bool:
     One with a memory takes long to compute: it is tried at few values.
     """
     several = bool(e.shape_parameters) or (not e.differentiable and len(e.coefficients) > 1)
-    told = e.search.times or e.search.tries or e.search.smooth
-    return several and not told and e.memory is None
+    stated = e.search.times or e.search.tries or e.search.smooth
+    return several and not stated and e.memory is None
 
 
 def by_starts(

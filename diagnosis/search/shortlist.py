@@ -223,7 +223,7 @@ def reweighted(
     it is correlated over more windows than overlap, fewer count as independent, by the same factor on
     all axes (the geometric mean of theirs): that an axis lacks something that lasts is no reason to
     believe the others more. On no axis does it count more than the error before, which a wrong winner
-    may have made larger. None: weighed so, no candidate has a signal, and nothing can be told.
+    may have made larger. None: weighed so, no candidate has a signal, and nothing can be distinguished.
     """
     least = ranking.table.sigma
     t = replace(t, sigma=least)

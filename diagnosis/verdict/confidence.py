@@ -108,7 +108,7 @@ class Confidence(NamedTuple):
 
     Attributes:
         own: probability that the effect is a true cause; NaN where the method has none.
-        of_set: the same that it or one of those it cannot be told from is.
+        of_set: the same that it or one of those it cannot be distinguished from is.
         doubt: what speaks against it in addition to the evidence, as a part of a sentence.
     """
 

@@ -65,7 +65,7 @@ class DecidedFindings(ShortRepr):
         dropped: effects that are not in the learned model: they were accepted, but no data prove their
             gain, or coefficients do as well, or they act like a coefficient that is beyond its prior.
         shares: for each finding the share of the error's sum of squares that it explains.
-        unique: for each the share that nothing else explains; None where that cannot be told.
+        unique: for each the share that nothing else explains; None where that is not known.
         posterior: of all fitted values; of none where nothing was learned.
         unrecorded: what acts on the ship and is in no command and no effect.
     """

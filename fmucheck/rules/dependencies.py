@@ -21,8 +21,8 @@ def _told(fmu: FmuOnTrial, element: str) -> list[tuple[DescribedVariable, set[in
 @trial("2.2.8")
 def initial_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     """During initialisation an unknown changes only with its dependencies in InitialUnknowns."""
-    told = _told(fmu, "InitialUnknowns")
-    unknowns = [v for v, _ in told]
+    stated = _told(fmu, "InitialUnknowns")
+    unknowns = [v for v, _ in stated]
     one = fmu.initialising()
     for known in fmu.description.variables:
         if known.type != "Real" or not (known.causality == "input" or known.initial == "exact"):
@@ -35,15 +35,15 @@ def initial_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
             one.set({known: near(known, share)})
             moved |= _moved(unknowns, before, one.get(unknowns))
             one.set({known: start_value(known)})
-        yield from _undeclared(told, known, moved, "while initialising")
+        yield from _undeclared(stated, known, moved, "while initialising")
     one.free()
 
 
 @trial("2.2.8")
 def output_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     """At a communication point, before the next step, an output depends only on inputs that it lists."""
-    told = _told(fmu, "Outputs")
-    outputs = [v for v, _ in told]
+    stated = _told(fmu, "Outputs")
+    outputs = [v for v, _ in stated]
     one = fmu.ready()
     fmu.play(one, 5, seed=0)
     for v in fmu.description.inputs():
@@ -52,7 +52,7 @@ def output_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
         (usual,) = one.get([v])
         before = one.get(outputs)
         one.set({v: other(v, usual)})
-        yield from _undeclared(told, v, _moved(outputs, before, one.get(outputs)), "without a step")
+        yield from _undeclared(stated, v, _moved(outputs, before, one.get(outputs)), "without a step")
         one.set({v: usual})
 
 
@@ -64,8 +64,8 @@ def step_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     What follows an input through a state shrinks with the step, what follows it directly does not.
     """
     fmu.needs("canHandleVariableCommunicationStepSize")
-    told = _told(fmu, "Outputs")
-    outputs = [v for v, _ in told]
+    stated = _told(fmu, "Outputs")
+    outputs = [v for v, _ in stated]
     usual = [_after(fmu, outputs, share) for share in (SHORT, SHORTER)]
     for v in fmu.description.inputs():
         if v.type != "Real" or v.variability != "continuous":
@@ -76,7 +76,7 @@ def step_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
             large, small = (abs(b[k] - a[k]) for a, b in zip(usual, changed, strict=True))
             if small > 1e-8 * max(1.0, abs(usual[1][k])) and small > 0.1 * large:
                 moved.add(output.name)
-        yield from _undeclared(told, v, moved, "over a step of no length")
+        yield from _undeclared(stated, v, moved, "over a step of no length")
 
 
 def _after(
@@ -107,11 +107,11 @@ def _moved(
 
 
 def _undeclared(
-    told: Sequence[tuple[DescribedVariable, set[int | None]]],
+    stated: Sequence[tuple[DescribedVariable, set[int | None]]],
     known: DescribedVariable,
     moved: set[str],
     when: str,
 ) -> Iterator[str]:
-    for unknown, dependencies in told:
+    for unknown, dependencies in stated:
         if unknown.name in moved and known.index not in dependencies:
             yield f"{unknown.name} depends on {known.name} {when}, but does not list it"

@@ -17,9 +17,9 @@ def exports(fmu: FmuOnTrial) -> Iterator[str]:
         yield f"{name} is not exported"
     for name, meant in (("fmi2GetVersion", b"2.0"), ("fmi2GetTypesPlatform", b"default")):
         if name not in fmu.library.missing:
-            told = fmu.library.function(name, c_char_p)()
-            if told != meant:
-                yield f"{name} returns {told!r}"
+            stated = fmu.library.function(name, c_char_p)()
+            if stated != meant:
+                yield f"{name} returns {stated!r}"
 
 
 @trial("2.1.5, 2.1.6, 4.2.4")

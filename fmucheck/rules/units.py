@@ -24,11 +24,11 @@ def base_units(fmu: FmuArchive) -> Iterator[str]:
             meant = base_exponents(name)
         except ValueError:
             continue  # another notation than ours
-        told = {b: whole(base.get(b, "0")) for b in BASES}
-        wrong = [b for b in BASES if told[b] != meant.get(b, 0)]
+        stated = {b: whole(base.get(b, "0")) for b in BASES}
+        wrong = [b for b in BASES if stated[b] != meant.get(b, 0)]
         if wrong:
             yield f"unit '{name}': " + ", ".join(
-                f"exponent of {b} is {told[b]}, not {meant.get(b, 0)}" for b in wrong
+                f"exponent of {b} is {stated[b]}, not {meant.get(b, 0)}" for b in wrong
             )
         elif number(base.get("factor", "1")) != 1.0 or number(base.get("offset", "0")) != 0.0:
             yield f"unit '{name}' is SI, but has a factor or an offset"

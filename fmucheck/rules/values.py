@@ -12,9 +12,9 @@ from ..registry import trial
 def start_values(fmu: FmuOnTrial) -> Iterator[str]:
     """Before any value is set, inputs and exact values equal the start values of the description."""
     one = fmu.initialising()
-    told = [v for v in fmu.description.variables if v.initial == "exact" or v.causality == "input"]
-    told = [v for v in told if start_value(v) is not None]
-    for v, value in zip(told, one.get(told), strict=True):
+    stated = [v for v in fmu.description.variables if v.initial == "exact" or v.causality == "input"]
+    stated = [v for v in stated if start_value(v) is not None]
+    for v, value in zip(stated, one.get(stated), strict=True):
         if not same(value, start_value(v)):
             yield f"{v.name} starts at {value!r}, not at {v.start}"
     one.free()

@@ -29,8 +29,8 @@ def additions(
 
 def differs(change: Change, parameters: Sequence[Variable], f: Found) -> str:
     """The end of a finding: how much is added to what is described."""
-    told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
-    return f"{change.text} differs from the model by {', '.join(told)}."
+    stated = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
+    return f"{change.text} differs from the model by {', '.join(stated)}."
 
 
 def changed(alike: Sequence[Actuator], change: Change) -> Effect:

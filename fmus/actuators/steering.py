@@ -21,7 +21,7 @@ from .response import total
 
 HALVINGS = 10  # of the shares; a straight line through the last two leaves 1e-6 of the full force
 GRAVITY = 9.81  # m/s2
-CRUISING = 0.1  # Froude number at which it is told to which side an angle turns the ship
+CRUISING = 0.1  # Froude number at which it is reported to which side an angle turns the ship
 TRIED = 0.1  # rad, the angle for that
 
 

@@ -17,7 +17,7 @@ first order, and the surge force is feed-forward and a PI law of the same kind.
 Frequencies and rates are in prime units, as manoeuvring coefficients are: w' = w L / U, with L the
 length between perpendiculars and U the speed, of those wanted and estimated the larger one, and at
 least ``u_least``. As forces of hull, rudder and propeller go with U^2, the same numbers give ships of
-all sizes at all speeds the same track in their lengths; inertia and damping are told.
+all sizes at all speeds the same track in their lengths; inertia and damping are given.
 
 Waves move the heading faster than a rudder should. With ``omega_wave``, the frequency at which they are
 met, the feedback of heading and rate passes a notch filter (Fossen 2021, ch. 13),

@@ -241,8 +241,8 @@ def inflow(d: Devices, slopes: Sequence[Inflow], apart: dict[str, str] | None = 
             way, at = ways[slope.axes[0]]
             x = f[slope.parameter.name] * at
             parts.append(f"{number(x)} N {'less' if x > 0.0 else 'more'} {way} at {number(at)} m/s")
-        told = [p for p, s in zip(parts, slopes, strict=True) if f[s.parameter.name]]
-        return f"{d.does('lose')} force with the inflow: {', '.join(told)}, at full command."
+        stated = [p for p, s in zip(parts, slopes, strict=True) if f[s.parameter.name]]
+        return f"{d.does('lose')} force with the inflow: {', '.join(stated)}, at full command."
 
     @declared(
         d,

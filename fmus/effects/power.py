@@ -66,8 +66,8 @@ def power_exponent(every: Devices, parts: Sequence[Devices]) -> Effect:
     names = {f"exponent_{d.name}": d for d in parts}
 
     def sentence(f: Found) -> str:
-        told = [f"of the {d.title} is {number(1.0 + f[n])}" for n, d in names.items() if f[n]]
-        return f"Thrust is not linear in the power setting: the exponent {', '.join(told)}."
+        stated = [f"of the {d.title} is {number(1.0 + f[n])}" for n, d in names.items() if f[n]]
+        return f"Thrust is not linear in the power setting: the exponent {', '.join(stated)}."
 
     tries: list[dict[str, float]] = [{}]
     for name in names:

@@ -17,11 +17,11 @@ _FACTOR = Range(-0.9, 10.0)
 
 
 def sentence(name: str, what: str) -> Wording:
-    def told(f: Found) -> str:
+    def stated(f: Found) -> str:
         sense = "larger" if f[name] > 0.0 else "smaller"
         return f"{what} is {percent(f[name])} {sense} than in the model, on all axes by the same factor."
 
-    return Wording(told, INERTIA if name == "scale_inertia" else SURGE_DRAG)
+    return Wording(stated, INERTIA if name == "scale_inertia" else SURGE_DRAG)
 
 
 @effect(

@@ -81,15 +81,15 @@ def _annotations(root: Element, component: Component) -> None:
     found = []
     if component.outline is not None:
         corners = " ".join(f"{x!r},{y!r}" for x, y in component.outline.corners)
-        told = {"name": component.outline.name, "length": repr(component.outline.length)}
-        found.append(Element("Ship", told, outline=corners))
+        stated = {"name": component.outline.name, "length": repr(component.outline.length)}
+        found.append(Element("Ship", stated, outline=corners))
     if component.trial:
         found.append(Element("Trial", kind=component.trial))
     if estimates := [(v.name, v.estimate) for v in component.variables if v.estimate is not None]:
         found.append(Element("Estimates"))
         for name, estimate in estimates:
-            told = {"parameter": name, "of": estimate.of, "change": str(estimate.change).lower()}
-            SubElement(found[-1], "Estimate", told)
+            stated = {"parameter": name, "of": estimate.of, "change": str(estimate.change).lower()}
+            SubElement(found[-1], "Estimate", stated)
     if found:
         annotations = SubElement(root, "VendorAnnotations")
         for element in found:

@@ -89,9 +89,9 @@ def make(effects: EffectSet, ship: Description, name: str = "thrusters", form: s
         changed=groups.changes.params(),
     )
     commands = commands_of(ship)
-    told = variables(commands) if ship.allocates else ()
+    reported = variables(commands) if ship.allocates else ()
     beside = measurable(ship)
-    outputs = group_of("Outputs", [*told, *variables(ThrusterForces), *variables(outputs_of(ship))])
+    outputs = group_of("Outputs", [*reported, *variables(ThrusterForces), *variables(outputs_of(ship))])
     request = Force() if ship.allocates else commands()
     inputs = bundle("Inputs", request=request, velocity=VelocityInCurrent())
 

@@ -5,7 +5,7 @@ acceleration is needed, is written as the forces g that the thrusters seem to gi
 usual for a velocity and a command is learned by recursive least squares from samples that are older than
 a window. In the window, a thruster that lost a share s of its force f leaves g = -s f of its own: its
 likelihood ratio, the largest over s and over the time of the failure, is divided by its mean so far
-(which is 1 for white noise) and held against the odds of a failure. While one is told, nothing is
+(which is 1 for white noise) and held against the odds of a failure. While one is reported, nothing is
 learned.
 
 The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
@@ -31,7 +31,7 @@ from ..sizing import sized
 Triple = tuple[Number, Number, Number]
 
 ROWS = 20  # of the window
-LEAST_ROWS = 4  # since the failure, before it is told
+LEAST_ROWS = 4  # since the failure, before it is reported
 AXES = ((0, 1), (2,))  # of the forces, those of each of the two thrusters
 COUNT = 7  # regressors of what is usual: 1, u, v, r, and the forces of the three thrusters
 STILL: Triple = (0.0, 0.0, 0.0)
@@ -123,7 +123,7 @@ class State(NamedTuple):
     f: Triple
     rows: tuple[WatchedSample, ...]
     usual: Usual
-    told: Detection
+    stated: Detection
 
 
 def init(i: Inputs, p: Fields) -> State:
@@ -205,7 +205,7 @@ def evidence(
 def judged(
     rows: tuple[WatchedSample, ...], usual: Usual, p: Fields
 ) -> tuple[tuple[Number, Number], Detection]:
-    """The likelihood ratios of the window, and what is told."""
+    """The likelihood ratios of the window, and what is reported."""
     found = [evidence(rows, usual, axes, p.least_loss) for axes in AXES]
     (whole_a, best_a, lost_a, since_a), (whole_b, best_b, lost_b, since_b) = found
     # A failure somewhere in the window, at any of its times.
@@ -218,8 +218,8 @@ def judged(
     ready = where(usual.judged >= p.first, 1.0, 0.0)
     a, b = [ready * x / (1.0 + odds[0] + odds[1]) for x in odds]
     since = where(a > b, since_a, since_b)
-    told = fmax(a, b) > 0.5
-    return (whole_a, whole_b), Detection((a, b), where(told, since, 0.0), (lost_a, lost_b))
+    stated = fmax(a, b) > 0.5
+    return (whole_a, whole_b), Detection((a, b), where(stated, since, 0.0), (lost_a, lost_b))
 
 
 def advanced(
@@ -246,19 +246,19 @@ def advanced(
     def sampled() -> tuple[tuple[WatchedSample, ...], Usual, Detection]:
         omega = (moved[0] - rest[0], moved[1] - rest[1], moved[2] - rest[2])
         old = s.rows[-1]
-        calm = (s.told.failed[0] < 0.5) & (s.told.failed[1] < 0.5)
+        calm = (s.stated.failed[0] < 0.5) & (s.stated.failed[1] < 0.5)
         usual = when((old.filled > 0.5) & calm, lambda: learned(s.usual, old, p), lambda: s.usual)
         row = WatchedSample(1.0, time, slow, f, forces(omega))
         z = regressors(slow, f)
         unsure = 1.0 + fmax(dot(z, [dot(line, z) for line in usual.P]), 0.0)
         row = row._replace(error=unusual(row, usual), unsure=unsure)
-        ratios, told = judged((row, *s.rows[:-1]), usual, p)
+        ratios, stated = judged((row, *s.rows[:-1]), usual, p)
         fair = where(usual.learned > 0.5 * p.first, 1.0, 0.0)
-        return (row._replace(ratios=ratios, fair=fair), *s.rows[:-1]), usual, told
+        return (row._replace(ratios=ratios, fair=fair), *s.rows[:-1]), usual, stated
 
-    rows, usual, told = when(due, sampled, lambda: (s.rows, s.usual, s.told))
-    after = State(time, quiet, where(due, 0.0, waited), slow, rest, f, rows, usual, told)
-    return choose(h > 0.0, after, s), told
+    rows, usual, stated = when(due, sampled, lambda: (s.rows, s.usual, s.stated))
+    after = State(time, quiet, where(due, 0.0, waited), slow, rest, f, rows, usual, stated)
+    return choose(h > 0.0, after, s), stated
 
 
 def make(effects: EffectSet, ship: Description) -> Component | None:
@@ -280,8 +280,8 @@ def make(effects: EffectSet, ship: Description) -> Component | None:
 
     def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         values = attacking(p.allocation, p.attack)
-        after, told = advanced(s, i, p, h, lambda tau: solution(ship, tau, values))
-        return after, outputs(*told.failed, told.since, *told.lost)
+        after, stated = advanced(s, i, p, h, lambda tau: solution(ship, tau, values))
+        return after, outputs(*stated.failed, stated.since, *stated.lost)
 
     watch = Component(
         name="watch_thrusters",

@@ -190,13 +190,13 @@ def test_a_channel_that_is_set_aside_has_its_reason_and_one_that_is_late_its_del
     assert aside["r"].why == UNUSED
 
 
-@pytest.mark.parametrize(("samples", "told"), [(3, False), (4, True)])
-def test_a_channel_with_fewer_samples_than_its_differences_need_is_left_out(samples, told):
+@pytest.mark.parametrize(("samples", "stated"), [(3, False), (4, True)])
+def test_a_channel_with_fewer_samples_than_its_differences_need_is_left_out(samples, stated):
     u = np.full(N, np.nan)
     u[10 : 10 + 7 * samples : 7] = np.random.default_rng(0).standard_normal(samples)
     found = channels(measured={"u": u})
-    assert ("u" in found) == told
-    if told:
+    assert ("u" in found) == stated
+    if stated:
         assert found["u"].rate == pytest.approx(1.0 / (7.0 * H))
 
 

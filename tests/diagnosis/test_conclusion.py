@@ -237,13 +237,13 @@ class Evidence(NamedTuple):
     listed: float = 1.0
 
 
-def told(names="abc"):
+def reported(names="abc"):
     s = selection(names)
     return Told(s.t, s.at, s.accepted, s.ranked, s.lacking, s.stated)
 
 
 def test_findings_have_their_values_with_intervals_shares_and_evidence():
-    s = told()
+    s = reported()
     found = s.findings()
     A = rows(names_of(s.at))
     std = np.sqrt(np.diag(np.linalg.inv(A.T @ A + precision_of(s.at))))
@@ -275,7 +275,7 @@ def test_a_modulated_force_in_the_place_of_an_effect_is_weighed_by_its_evidence(
     forces = [("the same", 3.0 * COLUMN["a"])] + [("another", SIGMA * np.ones((K, 3)))] * (not alone)
     monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: True)
     monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: forces)
-    (found, *_) = told().findings().effects
+    (found, *_) = reported().findings().effects
     assert found.evidence.listed == pytest.approx(0.5 if alone else 2.0 / 3.0, abs=1e-3)
     assert found.modulation == "the same"
 
@@ -283,11 +283,11 @@ def test_a_modulated_force_in_the_place_of_an_effect_is_weighed_by_its_evidence(
 def test_without_a_modulated_force_an_effect_is_as_sure(monkeypatch):
     monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: True)
     monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: [])
-    assert {(f.evidence.listed, f.modulation) for f in told().findings().effects} == {(1.0, "")}
+    assert {(f.evidence.listed, f.modulation) for f in reported().findings().effects} == {(1.0, "")}
 
 
 def test_findings_of_some_effects_are_fitted_anew():
-    s = told()
+    s = reported()
     found = s.findings(["A", "C"])
     assert [f.id for f in found.effects] == ["A", "C"]
     expected = best(Point({"a": 0.0, "c": 0.0}, np.zeros(2)))
@@ -301,6 +301,6 @@ def test_findings_of_some_effects_are_fitted_anew():
 
 def test_exact_coefficients_are_no_suspects(monkeypatch):
     monkeypatch.setattr(PRIOR, "std", {"X_u": 0.0, "N_r": 0.0})
-    found = told().findings()
+    found = reported().findings()
     assert found.suspects == []
     assert found.moved == {}

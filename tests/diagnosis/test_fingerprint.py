@@ -103,11 +103,11 @@ def test_what_json_holds_is_read_again_to_half_a_step():
 )
 def test_a_damaged_list_is_refused_with_its_file(damage):
     time = np.arange(0.0, 60.0, 0.25)
-    told = Fingerprint.of(smoothed(time, swings(time, 4))).content() | damage
+    stated = Fingerprint.of(smoothed(time, swings(time, 4))).content() | damage
     if damage == {"name": ...}:
-        del told["name"]
+        del stated["name"]
     with pytest.raises(InputError, match=r"'model\.json': its list of training runs is damaged"):
-        fingerprints([told], Path("model.json"))
+        fingerprints([stated], Path("model.json"))
     assert fingerprints([], Path("model.json")) == ()
 
 

@@ -108,7 +108,7 @@ def known(name, seen, fault=""):
     return SimpleNamespace(parameter=SimpleNamespace(name=name), known=seen, fault=fault)
 
 
-def told(monkeypatch, *each):
+def stated(monkeypatch, *each):
     chosen = []
     monkeypatch.setattr(learn_fmu, "sensitivities", lambda part, advance: SimpleNamespace(each=each))
     parts = {
@@ -122,7 +122,7 @@ def told(monkeypatch, *each):
 
 def test_parameters_that_the_runs_do_not_tell_are_kept_and_said(monkeypatch):
     each = known("m", True), known("c", False), known("d", True, "d: fails above 3"), known("k", False)
-    task, chosen = told(monkeypatch, *each)
+    task, chosen = stated(monkeypatch, *each)
     assert task.parameters == [each[0].parameter, each[2].parameter]
     assert chosen == [("train", task.parameters), ("test", task.parameters)]
     assert task.notes == [
@@ -133,7 +133,7 @@ def test_parameters_that_the_runs_do_not_tell_are_kept_and_said(monkeypatch):
 
 
 def test_all_that_are_known_leave_no_note_and_none_is_an_error(monkeypatch):
-    task, _ = told(monkeypatch, known("m", True))
+    task, _ = stated(monkeypatch, known("m", True))
     assert task.notes == ["first"]
     with pytest.raises(cosim.InputError, match="do not identify any parameter"):
-        told(monkeypatch, known("m", False))
+        stated(monkeypatch, known("m", False))

@@ -56,9 +56,9 @@ def test_time_counts_from_the_start_of_the_run_and_rows_that_were_not_seen_are_l
     assert line.startswith("y is frozen for 10 s, 25 s from the start")
 
 
-@pytest.mark.parametrize(("rows", "told"), [(IN_A_ROW, True), (IN_A_ROW - 1, False)])
-def test_noise_does_not_repeat_so_often(rows, told):
-    assert stuck(frozen(wandering(), 0, 100, 100 + rows), EVERY)[0].any() == told
+@pytest.mark.parametrize(("rows", "stated"), [(IN_A_ROW, True), (IN_A_ROW - 1, False)])
+def test_noise_does_not_repeat_so_often(rows, stated):
+    assert stuck(frozen(wandering(), 0, 100, 100 + rows), EVERY)[0].any() == stated
 
 
 def test_a_ship_that_goes_on_from_where_it_stood_was_not_frozen():
@@ -80,8 +80,8 @@ def test_at_the_end_it_is_frozen_where_it_moved_before_and_is_not_rounded():
     assert not stuck(always, EVERY)[0].any(), "it never moved"
 
 
-@pytest.mark.parametrize(("share", "told"), [(1.4, False), (1.6, True)])
-def test_a_jump_by_rounding_is_no_measurement_after_a_freeze(share, told):
+@pytest.mark.parametrize(("share", "stated"), [(1.4, False), (1.6, True)])
+def test_a_jump_by_rounding_is_no_measurement_after_a_freeze(share, stated):
     """A number that is rounded jumps by one step or, with noise, by one and a half."""
     run = frozen(wandering(), 0, 100, 140)
     pose = run.pose.copy()
@@ -89,7 +89,7 @@ def test_a_jump_by_rounding_is_no_measurement_after_a_freeze(share, told):
     coarse = np.zeros((N, 3))
     coarse[140, 0] = 1.0 / share
     coarse[141] = 1.0 / share
-    assert stuck(replace(run, pose=pose, resolution=coarse), EVERY)[0].any() == told
+    assert stuck(replace(run, pose=pose, resolution=coarse), EVERY)[0].any() == stated
 
 
 def test_a_coordinate_that_is_always_updated_so_rarely_is_not_frozen():

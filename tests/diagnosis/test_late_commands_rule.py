@@ -113,11 +113,13 @@ def test_one_column_that_varies_is_no_group_beside_itself(monkeypatch):
     assert late(monkeypatch, Given({}), varies=(False,) * 3) is None
 
 
-@pytest.mark.parametrize(("margin", "told"), [(0.9, False), (1.1, True)])
-def test_odds_must_be_beyond_chance_for_all_that_is_tried_and_the_best_rival(monkeypatch, margin, told):
+@pytest.mark.parametrize(("margin", "stated"), [(0.9, False), (1.1, True)])
+def test_odds_must_be_beyond_chance_for_all_that_is_tried_and_the_best_rival(
+    monkeypatch, margin, stated
+):
     needed = margin * -np.log(CHANCE) + np.log(tries())
-    assert bool(late(monkeypatch, Given({(0,): (needed, 1)}))) == told
-    assert bool(late(monkeypatch, Given({(0,): (needed + 7.0, 1)}, rival=7.0))) == told
+    assert bool(late(monkeypatch, Given({(0,): (needed, 1)}))) == stated
+    assert bool(late(monkeypatch, Given({(0,): (needed + 7.0, 1)}, rival=7.0))) == stated
 
 
 def test_one_block_alone_makes_no_column_late(monkeypatch):
@@ -125,7 +127,7 @@ def test_one_block_alone_makes_no_column_late(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("factor", "logged", "told"),
+    ("factor", "logged", "stated"),
     [
         (1.0 + 0.99 * MEASURED, 1.0, True),
         (1.0 - 0.99 * MEASURED, 1.0, True),
@@ -136,15 +138,15 @@ def test_one_block_alone_makes_no_column_late(monkeypatch):
     ],
 )
 def test_the_force_must_act_once_or_nearer_to_once_than_as_it_is_logged(
-    monkeypatch, factor, logged, told
+    monkeypatch, factor, logged, stated
 ):
     """On the axis that it explains most."""
-    assert bool(late(monkeypatch, Given({(0,): (50.0, 1)}, factor, logged))) == told
+    assert bool(late(monkeypatch, Given({(0,): (50.0, 1)}, factor, logged))) == stated
 
 
-@pytest.mark.parametrize(("windows", "told"), [(OVERLAP * 4 - 1, False), (OVERLAP * 4, True)])
-def test_a_run_has_as_many_independent_windows_as_factors_that_are_fitted(monkeypatch, windows, told):
-    assert bool(late(monkeypatch, Given({(0,): (50.0, 1)}), windows=int(windows))) == told
+@pytest.mark.parametrize(("windows", "stated"), [(OVERLAP * 4 - 1, False), (OVERLAP * 4, True)])
+def test_a_run_has_as_many_independent_windows_as_factors_that_are_fitted(monkeypatch, windows, stated):
+    assert bool(late(monkeypatch, Given({(0,): (50.0, 1)}), windows=int(windows))) == stated
 
 
 # The likelihood

@@ -167,10 +167,10 @@ def test_the_interval_of_a_sway_is_that_of_its_inverse():
 # Channels that are many times what the pose says
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.0 - 0.9 * ALIKE, False), (1.0 + 1.2 * ALIKE, True)])
-def test_a_scale_that_is_near_one_is_left_to_the_estimate(factor, told):
+@pytest.mark.parametrize(("factor", "stated"), [(1.0 - 0.9 * ALIKE, False), (1.0 + 1.2 * ALIKE, True)])
+def test_a_scale_that_is_near_one_is_left_to_the_estimate(factor, stated):
     found = units(times(sailed(), u=1.0 / factor, v=1.0 / factor), REFERENCE)
-    assert bool(found.findings) == told
+    assert bool(found.findings) == stated
 
 
 @pytest.mark.parametrize("factor", [7.0, -7.0, -1.0])

@@ -50,8 +50,8 @@ def opened(page, folder, *options, milliseconds=5000):
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    told = re.findall(r".*CONSOLE.*", done.stderr)
-    assert not told, told
+    stated = re.findall(r".*CONSOLE.*", done.stderr)
+    assert not stated, stated
     return done.stdout
 
 

@@ -39,8 +39,8 @@ def table(owners: Iterable[tuple[str, Iterable[Variable]]]) -> Iterator[str]:
         rows.setdefault((owned, allowed), {}).setdefault(f"{start!r} {unit}", []).append(f"`{name}`")
     yield "| of | allowed, known to | start values |\n|---|---|---|"
     for cells, starts in rows.items():
-        told = "; ".join(f"{start}: {', '.join(names)}" for start, names in starts.items())
-        yield f"| {' | '.join(cells)} | {told} |"
+        stated = "; ".join(f"{start}: {', '.join(names)}" for start, names in starts.items())
+        yield f"| {' | '.join(cells)} | {stated} |"
 
 
 def page() -> str:

@@ -24,9 +24,9 @@ def slow_tests() -> frozenset[str]:
 def long_ones(report: Path) -> Iterator[str]:
     """Node ids of the tests of a report that took longer than LONG."""
     for case in ElementTree.parse(report).iter("testcase"):
-        told = {p.get("name"): p.get("value", "") for p in case.iter("property")}
-        if float(told.get(PROCESSOR, "0")) > LONG:
-            yield told[NODE]
+        stated = {p.get("name"): p.get("value", "") for p in case.iter("property")}
+        if float(stated.get(PROCESSOR, "0")) > LONG:
+            yield stated[NODE]
 
 
 if __name__ == "__main__":

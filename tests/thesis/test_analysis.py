@@ -323,8 +323,8 @@ def test_a_regression_is_told_in_sentences():
         assert [row[0] for row in coefficients.rows] == [*found.columns]
         for row, value in zip(coefficients.rows, part.B[0], strict=True):
             assert row[1].startswith(f"{number(value)} ± ")
-        told = [" of other sign" in row[1] for row in coefficients.rows]
-        assert told == [bool(n) for n in part.sign_changes[0]]
+        stated = [" of other sign" in row[1] for row in coefficients.rows]
+        assert stated == [bool(n) for n in part.sign_changes[0]]
         points, names = pls_report.correlations(found, part)
         both = np.column_stack([found.X, found.samples.omega[:, part.axes]])
         scores = part.model.transform(found.X)[:, :2]

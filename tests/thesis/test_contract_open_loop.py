@@ -98,15 +98,15 @@ def test_an_open_loop_has_the_observer_the_controller_and_what_gives_what_was_lo
         assert notes == []
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_thrusters_limit_what_the_controller_asks(told):
-    content, notes = scenario(source(), loop(thrusters={"path": "t"}, told=told))
+@pytest.mark.parametrize("stated", [True, False])
+def test_thrusters_limit_what_the_controller_asks(stated):
+    content, notes = scenario(source(), loop(thrusters={"path": "t"}, stated=stated))
     links = content["connections"]
     assert ["controller.tau_*", "thrusters.tau_*"] in links
     assert ["thrusters.tau_cmd_*", "observer.tau_*"] in links
-    assert (["thrusters.tau_cmd_*", "controller.tau_cmd_*"] in links) == told
+    assert (["thrusters.tau_cmd_*", "controller.tau_cmd_*"] in links) == stated
     inputs = content["recordings"][0]["inputs"]
-    assert any(n.startswith("controller.tau_cmd") for n in inputs) == told
+    assert any(n.startswith("controller.tau_cmd") for n in inputs) == stated
     # Without a target the estimate is its own.
     assert ["observer.psi_hat", "controller.psi_t"] in links
     assert "the run has no target" in notes[0]
@@ -259,15 +259,15 @@ def reported(own=True, lost=None):
 def test_the_content_has_what_was_recovered_stored_and_blocked():
     lost = np.zeros(N, bool)
     lost[:7] = True
-    told = replay_report.content(reported(lost={"z": lost}))
-    assert told["recovered"] == {"z": 7}
-    assert told["phi_hat"] == pytest.approx({"phi_hat_X": 4.9, "phi_hat_Y": 9.8})
-    assert told["sigma_min"] == pytest.approx(0.49)
-    assert told["stored"]["count"] == 2
-    assert told["spikes"]["count"] == 2
-    assert told["blocked"] == {"share": 0.1, "times": [[0.5, pytest.approx(0.9)]]}
-    assert told["agreement"] == pytest.approx({"z": 0.25})
-    assert (told["samples"], told["step"], told["own_controller"]) == (N, H, True)
+    stated = replay_report.content(reported(lost={"z": lost}))
+    assert stated["recovered"] == {"z": 7}
+    assert stated["phi_hat"] == pytest.approx({"phi_hat_X": 4.9, "phi_hat_Y": 9.8})
+    assert stated["sigma_min"] == pytest.approx(0.49)
+    assert stated["stored"]["count"] == 2
+    assert stated["spikes"]["count"] == 2
+    assert stated["blocked"] == {"share": 0.1, "times": [[0.5, pytest.approx(0.9)]]}
+    assert stated["agreement"] == pytest.approx({"z": 0.25})
+    assert (stated["samples"], stated["step"], stated["own_controller"]) == (N, H, True)
     assert replay_report.content(replay())["sigma_min"] is None
 
 
@@ -358,20 +358,24 @@ def test_the_fmus_of_a_log_are_its_own_and_never_its_plant(folder):
     assert found.observer == {"path": "observer_kalman.fmu", "parameters": {"a": 1.0}}
     assert found.guidance == {"path": "guidance_ellipse.fmu"}
     assert found.thrusters == {"path": "thrusters.fmu", "parameters": {"l_vsp": 0.5}}
-    assert (found.told, found.own) == (True, True)
+    assert (found.stated, found.own) == (True, True)
     assert playback.loop_of(folder / "log.csv", "abs", None, None) == found
     assert playback.loop_of(folder / "log.csv", "abs", "kalman", None) == found
 
 
 def test_another_controller_or_observer_is_not_that_of_the_run(folder):
     other = playback.loop_of(folder, "cl_win", None, None)
-    assert (other.controller, other.own, other.told) == ({"path": "controller_cl_win.fmu"}, False, True)
+    assert (other.controller, other.own, other.stated) == (
+        {"path": "controller_cl_win.fmu"},
+        False,
+        True,
+    )
     seen = playback.loop_of(folder, "abs", "mdf", None)
     assert (seen.observer, seen.own) == ({"path": "observer_mdf.fmu"}, False)
     silent = {**SCENARIO, "connections": SCENARIO["connections"][1:]}
     (folder / "log.json").write_text(json.dumps({"scenario": silent}))
-    assert not playback.loop_of(folder, "abs", None, None).told, "it was not told in the run"
-    assert playback.loop_of(folder, "cl_win", None, None).told
+    assert not playback.loop_of(folder, "abs", None, None).stated, "it was not told in the run"
+    assert playback.loop_of(folder, "cl_win", None, None).stated
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", None])
@@ -379,7 +383,7 @@ def test_without_a_scenario_the_usual_fmus_are_taken(folder, text):
     (folder / "log.json").unlink() if text is None else (folder / "log.json").write_text(text)
     found = playback.loop_of(folder, "abs", None, None)
     assert found.observer == {"path": "observer_mdf.fmu"}
-    assert (found.guidance, found.own, found.told) == (None, False, True)
+    assert (found.guidance, found.own, found.stated) == (None, False, True)
     assert found.thrusters == {"path": "thrusters.fmu", "parameters": {}}
     (folder / "log.json").write_text(json.dumps({"scenario": SCENARIO}))
     assert playback.loop_of(folder / "a.csv", "abs", None, None).guidance is None, (
@@ -400,7 +404,7 @@ def test_a_scenario_that_is_given_counts_in_place_of_the_run_s(folder, monkeypat
 def test_a_detector_takes_the_place_of_the_controller(folder):
     found = playback.watch_loop(folder, "watch_thrusters", None, None)
     assert found.controller == {"path": "watch_thrusters.fmu"}
-    assert (found.guidance, found.thrusters, found.told) == (None, None, True)
+    assert (found.guidance, found.thrusters, found.stated) == (None, None, True)
     assert found.observer["path"] == "observer_kalman.fmu"
 
 

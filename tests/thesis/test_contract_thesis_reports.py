@@ -285,9 +285,9 @@ def components():
 
 
 def test_components_are_told_with_what_was_removed():
-    told = outlier_report.content(components(), "smoothed")
-    assert told["removed_share"] == pytest.approx(0.025)
-    assert told["removed"][6] == {
+    stated = outlier_report.content(components(), "smoothed")
+    assert stated["removed_share"] == pytest.approx(0.025)
+    assert stated["removed"][6] == {
         "run": "a",
         "from": 2.0,
         "to": 5.0,
@@ -295,7 +295,7 @@ def test_components_are_told_with_what_was_removed():
         "why": "T2",
         "variable": "u",
     }
-    assert told["loadings"].shape == (2, 9)
+    assert stated["loadings"].shape == (2, 9)
     first, above, gone = outlier_report.sentences(components())
     assert first.startswith(
         "2 components explain 56 % of the variance of 9 variables in 200 samples, cross-validated 46 %"

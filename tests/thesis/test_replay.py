@@ -50,15 +50,15 @@ def test_what_was_lost_comes_back_exactly(voyage, tmp_path):
         assert (found[name] == whole[name]).all(), name
     for name in LOST:
         assert (found[f"recovered.{name.partition('.')[2]}"] == gone).all()
-    told = json.loads((tmp_path / "replay.json").read_text())
-    assert told["recovered"] == {n.partition(".")[2]: int(gone.sum()) for n in LOST}
-    assert max(told["agreement"].values()) == 0.0
-    assert told["own_controller"]
-    assert told["applied_force"]
-    assert told["blocked"]["share"] == pytest.approx((whole["controller.beta"] < 0.5).mean())
-    assert told["stored"]["count"] == whole["controller.stored_at"].diff().gt(0.0).sum() > 3
-    assert any(abs(t - 9.0) < 0.011 for t in told["spikes"]["times"])
-    assert 0.0 < told["spike_share"]["time"] < 0.5
+    stated = json.loads((tmp_path / "replay.json").read_text())
+    assert stated["recovered"] == {n.partition(".")[2]: int(gone.sum()) for n in LOST}
+    assert max(stated["agreement"].values()) == 0.0
+    assert stated["own_controller"]
+    assert stated["applied_force"]
+    assert stated["blocked"]["share"] == pytest.approx((whole["controller.beta"] < 0.5).mean())
+    assert stated["stored"]["count"] == whole["controller.stored_at"].diff().gt(0.0).sum() > 3
+    assert any(abs(t - 9.0) < 0.011 for t in stated["spikes"]["times"])
+    assert 0.0 < stated["spike_share"]["time"] < 0.5
     assert "<svg" in (tmp_path / "report.html").read_text()
 
 
@@ -81,29 +81,29 @@ def test_run_without_target_and_with_irregular_samples(voyage, tmp_path, capsys)
     rows[list(names)].rename(columns=names).to_csv(tmp_path / "run.csv", index=False)
     out = tmp_path / "out"
     assert main([str(tmp_path / "run.csv"), "--controller", "cl_win_eps", "--out", str(out)]) == 0
-    told = json.loads((out / "replay.json").read_text())
-    assert told["recovered"] == {}
-    assert told["stored"]["count"] > 0
-    assert any("no target" in note for note in told["notes"])
+    stated = json.loads((out / "replay.json").read_text())
+    assert stated["recovered"] == {}
+    assert stated["stored"]["count"] > 0
+    assert any("no target" in note for note in stated["notes"])
     assert "other controller" in capsys.readouterr().out.replace("\n", " ")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "stated"),
     [
         (["--controller", "clx"], "no FMU 'controller_clx'"),
         (["--controller", "vessel.fmu"], "connections"),
         (["--controller", "abs", "--scenario", "none.json"], "no such scenario"),
     ],
 )
-def test_bad_input_is_one_message(tmp_path, capsys, arguments, told):
+def test_bad_input_is_one_message(tmp_path, capsys, arguments, stated):
     t = 0.05 * np.arange(400)
     columns = {"time": t, "x": np.sin(t), "y": np.cos(t), "psi": 0.1 * t}
     columns |= {f"tau_{axis}": np.sin(0.3 * t) for axis in "XYN"}
     pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
     out = tmp_path / "out"
     assert main([str(tmp_path / "run.csv"), *arguments, "--out", str(out)]) == 2
-    assert told in capsys.readouterr().err
+    assert stated in capsys.readouterr().err
     assert not out.exists()
 
 
@@ -150,8 +150,8 @@ def test_a_loop_is_that_of_the_log_but_for_what_is_named(tmp_path):
     assert other == OpenLoop({"path": "controller_bs.fmu"}, mdf, drive, fmus["guidance"], True, False)
     content["connections"] = []
     (tmp_path / "log.json").write_text(json.dumps({"scenario": content}))
-    assert not loop_of(tmp_path, "cl_win_eps", None, None).told, "its own controller was told nothing"
-    assert loop_of(tmp_path, "cl_win_eps", "mdf", None).told, "one that saw something else is told"
+    assert not loop_of(tmp_path, "cl_win_eps", None, None).stated, "its own controller was told nothing"
+    assert loop_of(tmp_path, "cl_win_eps", "mdf", None).stated, "one that saw something else is told"
     watch = watch_loop(tmp_path, "watch_thrusters", None, None)
     assert watch == OpenLoop({"path": "watch_thrusters.fmu"}, eyes, None, None, True, False)
     for text in ("{", "[]", "{}"):  # cut off

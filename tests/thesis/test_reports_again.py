@@ -41,8 +41,8 @@ def test_report_is_what_todays_code_makes_of_its_results(name, tmp_path):
     shutil.copy(STUDIES / name / "results.json", tmp_path)
     AGAIN[name](tmp_path)
     for file in ("report.md", "results.json"):
-        told = f"python -m thesis.… --again --out docs/studies/{name}"
-        assert (tmp_path / file).read_text("utf-8") == (STUDIES / name / file).read_text("utf-8"), told
+        stated = f"python -m thesis.… --again --out docs/studies/{name}"
+        assert (tmp_path / file).read_text("utf-8") == (STUDIES / name / file).read_text("utf-8"), stated
 
 
 def test_report_without_results_is_not_written_anew(tmp_path):

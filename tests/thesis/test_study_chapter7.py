@@ -59,7 +59,7 @@ def drawn(monkeypatch):
     return made
 
 
-def told(tmp_path, write, *given):
+def stated(tmp_path, write, *given):
     report = Report(tmp_path, "t")
     write(report, *given)
     return report.write().read_text("utf-8")
@@ -168,7 +168,7 @@ def test_the_eight_has_its_components_a_row_for_each_recipe_and_its_findings(
     monkeypatch.setattr(
         analysis_tables, "findings", lambda given: [Verdict("A statement", True, "numbers")]
     )
-    text = told(tmp_path, analysis_tables.write_eight, s, found)
+    text = stated(tmp_path, analysis_tables.write_eight, s, found)
     assert asked == [(s, "eight")]
     assert "A statement: eight" in text
     for name, r in found.items():
@@ -177,7 +177,7 @@ def test_the_eight_has_its_components_a_row_for_each_recipe_and_its_findings(
 
 @pytest.mark.quick
 def test_pictures_of_the_regressions(found, tmp_path, drawn):
-    told(tmp_path, analysis_tables.write_regressions, found, "made")
+    stated(tmp_path, analysis_tables.write_regressions, found, "made")
     assert {name.removeprefix("made_") for name in drawn} >= {
         *(f"PLS2_{axis}" for axis in AXES),
         *(f"{name}_variance_XYN" for name in ("PLS2", "PLS3")),
@@ -225,7 +225,7 @@ def test_scatter_has_each_force_over_each_velocity(monkeypatch):
 
 
 def test_components_are_told_and_drawn(tmp_path, drawn):
-    text = told(tmp_path, analysis_tables.write_components, linear(0.01), "made")
+    text = stated(tmp_path, analysis_tables.write_components, linear(0.01), "made")
     assert "4 components explain" in text
     assert set(drawn) == {"made_scatter", "made_outliers"}
 
@@ -235,7 +235,7 @@ def test_the_row_that_made_the_samples_explains_them(tmp_path, drawn):
     names, t, nu, nu_dot, tau = motion()
     made = Samples(names, t, nu, nu_dot, tau, np.zeros_like(nu))
     made.omega[:] = analysis.regressors(made) @ np.array(sysid4.PHI)
-    text = told(tmp_path, analysis_tables.write_table_7_1, made, "made")
+    text = stated(tmp_path, analysis_tables.write_table_7_1, made, "made")
     rows = {
         line.split(" | ")[0][2:]: line.split(" | ")[1:4]
         for line in text.splitlines()
@@ -291,7 +291,7 @@ def test_columns_of_a_run_sum_to_one_for_each_state():
 @pytest.mark.quick
 def test_shapes_are_those_of_the_regression(tmp_path, drawn):
     s = linear(0.01)
-    told(tmp_path, analysis_tables.write_shapes, s, wave())
+    stated(tmp_path, analysis_tables.write_shapes, s, wave())
     assert set(drawn) == {"simulated_shapes", "simulated_matrices"}
     found = analysis.regressed(analysis.without_outliers(s), analysis.recipe("continuous"))
     for panel, state in zip(drawn["simulated_shapes"][0].axes, (*NU, *TAU), strict=True):
@@ -358,7 +358,7 @@ def test_table_of_the_loops_has_what_is_lost(found, tmp_path, monkeypatch, drawn
         }
 
     monkeypatch.setattr(model_loops, "run_all", run_all)
-    text = told(tmp_path, model_loops.write_loops, found, 30.0, 3)
+    text = stated(tmp_path, model_loops.write_loops, found, 30.0, 3)
     assert (
         "| SYSID1 |  |  | 0.25 (-0.125) | 0.25 (-0.125) | 0.25 (-0.125) | 0.25 (-0.125) | 0.25 (-0.125) |"
         in text
@@ -403,7 +403,7 @@ def test_identification_stands_beside_what_is_hidden(tmp_path, monkeypatch):
         analysis, "explained", lambda runs, phi: np.array([0.5, 0.25, phi[1] / sysid4.PHI[1]])
     )
     s, e = linear(), linear(0.01)
-    text = told(tmp_path, chapter7.identification, [("true states", s), ("eight", e)])
+    text = stated(tmp_path, chapter7.identification, [("true states", s), ("eight", e)])
     assert asked == [[s], [e]]
     assert "| SysID has the main dynamics of the model error (7.2.4) | does not hold |" in text
     assert "here the eight (7.2.4) | does not hold |" in text
@@ -452,7 +452,7 @@ def test_real_runs_have_the_same_parts(found, tmp_path, monkeypatch, drawn):
         analysis, "gather_samples", lambda files, by: asked.append((files, by)) or analysis.by_run(s)
     )
     monkeypatch.setattr(analysis_tables, "regressions", lambda samples: found)
-    text = told(tmp_path, chapter7.measured, tmp_path)
+    text = stated(tmp_path, chapter7.measured, tmp_path)
     assert asked == [([tmp_path / "a.mat"], "smoothed")]
     assert "NTNU's runs run0, run1 in a row" in text
     assert "limits of Algorithm 4: 1 passes, not converged, the blocker" in text
@@ -471,7 +471,7 @@ def test_a_run_that_broke_off_ends_the_study():
 
 
 def test_the_study_runs_every_scenario_and_reads_what_lies_in_its_folder(tmp_path, monkeypatch):
-    read, ran, told = [], {}, []
+    read, ran, stated = [], {}, []
     s = linear(0.01)
 
     def run_all(todo, seeds, analyse, logs, jobs, advance):
@@ -486,15 +486,15 @@ def test_the_study_runs_every_scenario_and_reads_what_lies_in_its_folder(tmp_pat
     monkeypatch.setattr(
         analysis, "gather_samples", lambda runs, by: read.extend(runs) or analysis.by_run(s)
     )
-    monkeypatch.setattr(analysis_tables, "write_shapes", lambda *given: told.append("shapes"))
-    monkeypatch.setattr(chapter7, "write_replay", lambda *given: told.append(given[1].parent.name))
-    monkeypatch.setattr(analysis_tables, "write_eight", lambda *given: told.append("eight"))
-    monkeypatch.setattr(chapter7, "simulated", lambda *given: told.append([n for n, _ in given[2]]))
-    monkeypatch.setattr(chapter7, "write_loops", lambda *given: told.append(given[2:]))
-    monkeypatch.setattr(chapter7, "measured", lambda report, data: told.append(data))
+    monkeypatch.setattr(analysis_tables, "write_shapes", lambda *given: stated.append("shapes"))
+    monkeypatch.setattr(chapter7, "write_replay", lambda *given: stated.append(given[1].parent.name))
+    monkeypatch.setattr(analysis_tables, "write_eight", lambda *given: stated.append("eight"))
+    monkeypatch.setattr(chapter7, "simulated", lambda *given: stated.append([n for n, _ in given[2]]))
+    monkeypatch.setattr(chapter7, "write_loops", lambda *given: stated.append(given[2:]))
+    monkeypatch.setattr(chapter7, "measured", lambda report, data: stated.append(data))
     chapter7.study(tmp_path, 9.0, 2, None)
     assert ran == {where: str(where) for where in read}
     quiet = ["true states", "smoothed", "mdf", "eight"]
-    assert told == ["shapes", "controller_cl_win_eps_eight", quiet, "eight", (9.0, 2)]
+    assert stated == ["shapes", "controller_cl_win_eps_eight", quiet, "eight", (9.0, 2)]
     chapter7.study(tmp_path, None, 2, tmp_path)
-    assert told[-1] == tmp_path
+    assert stated[-1] == tmp_path

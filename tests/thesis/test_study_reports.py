@@ -121,9 +121,9 @@ def test_conditions_of_chapter_5_are_what_they_say():
         content = made[condition][name]
         assert content["fmus"]["controller"]["path"] == f"{name}.fmu"
         assert (content["stop"], content["metrics"]) == (60.0, {"from": 30.0})
-        told = "optional_connections" not in content or bool(content["optional_connections"])
+        stated = "optional_connections" not in content or bool(content["optional_connections"])
         values = content["fmus"]["controller"].get("parameters", {})
-        return values, told, bool(content["faults"])
+        return values, stated, bool(content["faults"])
 
     gate, stale = {"tau_max": 1e6}, {"tau_max": 1e6, "stale": 1.0}
     for sense, faults in (("mdf", True), ("true", False)):

@@ -79,8 +79,8 @@ def test_probability_is_that_of_bayes(share):
     )
     before = p.failure_rate * p.sample_time
     odds = before * np.exp(0.5 * gain)
-    _, told = watch.judged(rows, usual, p)
-    assert told.failed[1] == pytest.approx(odds / (1.0 + odds + before), rel=1e-9)
+    _, stated = watch.judged(rows, usual, p)
+    assert stated.failed[1] == pytest.approx(odds / (1.0 + odds + before), rel=1e-9)
 
 
 def test_one_bad_sample_counts_little():
@@ -177,13 +177,13 @@ def test_dead_bow_thruster_is_told_in_the_loop_and_from_its_log(tmp_path):
     ]
     cosim.simulate(cosim.load_scenario(content | {"stop": 110.0}), tmp_path / "run")
     log = cosim.read_log(tmp_path / "run")
-    told = np.flatnonzero(np.maximum(log["watch.failed_bow"], log["watch.failed_vsp"]) > 0.5)
-    assert 90.0 < log["time"][told[0]] < 100.0
-    assert (log["watch.failed_bow"][told] > 0.5).all()
+    stated = np.flatnonzero(np.maximum(log["watch.failed_bow"], log["watch.failed_vsp"]) > 0.5)
+    assert 90.0 < log["time"][stated[0]] < 100.0
+    assert (log["watch.failed_bow"][stated] > 0.5).all()
     assert main([str(tmp_path / "run"), "--out", str(tmp_path / "out")]) == 0
     found = json.loads((tmp_path / "out" / "watch.json").read_text())
     assert found["thruster"] == "bow"
-    assert found["noticed"] == pytest.approx(log["time"][told[0]], abs=0.02)
+    assert found["noticed"] == pytest.approx(log["time"][stated[0]], abs=0.02)
     assert found["time"] == pytest.approx(90.0, abs=3.0)
     assert found["confidence"] == pytest.approx(log["watch.failed_bow"].max())
     assert "<svg" in (tmp_path / "out" / "report.html").read_text()

@@ -119,7 +119,7 @@ def sentences(a: OutlierComponents) -> Iterator[str]:
 def document(a: OutlierComponents, estimates: str) -> Document:
     """The page."""
     m, s = a.model, a.samples
-    told = " ".join(sentences(a))
+    stated = " ".join(sentences(a))
     Z = m.scores(a.X)
     plane = m.loadings[:, :2] * np.sqrt(m.variance[:2])
     share = ReportSection(
@@ -175,4 +175,4 @@ def document(a: OutlierComponents, estimates: str) -> Document:
         ],
     )
     made = {"runs": ", ".join(s.names), "estimates": estimates}
-    return Document("Principal components", told, [share, gone], made)
+    return Document("Principal components", stated, [share, gone], made)

@@ -71,8 +71,8 @@ def sentences(r: Regressed, stable: Stable | None = None) -> Iterator[str]:
         )
     outside = {n: x for n, x in r.clipped.items() if x > 0.0}
     if outside:
-        told = ", ".join(f"{n} {percent(x)}" for n, x in outside.items())
-        yield f"Outside of the ranges of Table 1, and clipped: {told}."
+        stated = ", ".join(f"{n} {percent(x)}" for n, x in outside.items())
+        yield f"Outside of the ranges of Table 1, and clipped: {stated}."
     if goes_into_the_plant(r.columns):
         yield thrust_of(r).sentence
     if stable is not None:

@@ -94,7 +94,7 @@ def unstable(lost: Mapping[str, int], holds: Mapping[str, bool], numbers: str) -
 
 
 def why(found: Mapping[str, Regressed]) -> str:
-    """What the regressions make of the surge force, and whether it can be told from the speed."""
+    """What the regressions make of the surge force, and whether the speed hides it."""
     x = next(iter(found.values())).samples.x
     parts = [
         f"{n} ({r.by_axis('factors')['X']} factors) {r.B[0, r.columns.index('tau_X')]:.2f}"

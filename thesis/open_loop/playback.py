@@ -34,7 +34,7 @@ class OpenLoop:
         controller, observer: FMUs.
         thrusters: gives the force where the run has lost it; None: a lost force keeps its last value.
         guidance: where the run has no target, or has lost some of it.
-        told: whether the controller is told the force that acted.
+        stated: whether the controller gets the force that acted.
         own: whether observer and controller are those of the run.
     """
 
@@ -42,7 +42,7 @@ class OpenLoop:
     observer: Entry
     thrusters: Entry | None = None
     guidance: Entry | None = None
-    told: bool = True
+    stated: bool = True
     own: bool = False
 
 
@@ -100,15 +100,15 @@ def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | N
         if k in ship().allocation_parameters
     }
     wired = [] if content is None else [target for _, target in content["connections"]]
-    told = not own or any(target.startswith("controller.tau_cmd") for target in wired)
+    stated = not own or any(target.startswith("controller.tau_cmd") for target in wired)
     thrusters = {"path": "thrusters.fmu", "parameters": believed}
-    return OpenLoop(law, eyes, thrusters, taken.get("guidance"), told, own and scenario is None)
+    return OpenLoop(law, eyes, thrusters, taken.get("guidance"), stated, own and scenario is None)
 
 
 def watch_loop(run: Path, watch: str, observer: str | None, scenario: Path | None) -> OpenLoop:
     """The observer as of :func:`loop_of`, and a detector in the controller's place."""
     found = loop_of(run, watch, observer, scenario)
-    return replace(found, guidance=None, thrusters=None, told=True)
+    return replace(found, guidance=None, thrusters=None, stated=True)
 
 
 def _content_of(run: Path) -> dict[str, Any] | None:
@@ -173,7 +173,7 @@ def _regular(source: Source) -> bool:
 
 
 def _paced(loop: OpenLoop, source: Source) -> Entry:
-    """The observer, told how often there is a new measurement, if nobody has."""
+    """The observer, which gets how often there is a new measurement, if nobody has."""
     kind, _, name = loop.observer["path"].removesuffix(".fmu").partition("_")
     if "parameters" in loop.observer or kind != "observer":
         return loop.observer
@@ -230,11 +230,11 @@ def _scenario(
             ["controller.tau_*", "thrusters.tau_*"],
             ["thrusters.tau_cmd_*", "observer.tau_*"],
         ]
-        if loop.told:
+        if loop.stated:
             connections.append(["thrusters.tau_cmd_*", "controller.tau_cmd_*"])
     inputs = {n: n for n in columns if "." in n}
     inputs |= {f"observer.{n.replace('_cmd', '')}": n for n in COMMAND}
-    if loop.told:
+    if loop.stated:
         inputs |= {f"controller.{n}": n for n in COMMAND}
     gaps = source.target is not None and not np.isfinite(source.target).all()
     if loop.guidance is not None and (source.target is None or gaps):

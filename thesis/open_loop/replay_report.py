@@ -43,7 +43,7 @@ def content(r: Replay) -> dict[str, Any]:
         "run": played.source.name,
         "controller": played.loop.controller,
         "observer": played.loop.observer,
-        "applied_force": played.loop.told,
+        "applied_force": played.loop.stated,
         "own_controller": played.loop.own,
         "step": played.source.step,
         "samples": played.source.time.size,
@@ -100,9 +100,9 @@ def sentences(r: Replay) -> Iterator[str]:
             f"{r.stored.size} samples stored, learning blocked {percent(float(r.blocked.mean()))} "
             f"of the time; {r.spikes.size} spikes and jumps."
         )
-        told = [("of the time", "time"), ("of the stored samples", "stored")]
-        told += [("of the update by the store", "by_store"), ("by the present error", "by_now")]
-        parts = [f"{percent(share[k])} {text}" for text, k in told if np.isfinite(share[k])]
+        stated = [("of the time", "time"), ("of the stored samples", "stored")]
+        stated += [("of the update by the store", "by_store"), ("by the present error", "by_now")]
+        parts = [f"{percent(share[k])} {text}" for text, k in stated if np.isfinite(share[k])]
         yield f"Within a second after one: {', '.join(parts)}."
     yield from played.notes
 

@@ -14,7 +14,7 @@ from .replayed import stretches
 
 WATCH = "watch_thrusters.fmu"
 THRUSTERS = {"vsp": "the VSP", "bow": "the bow thruster"}
-SURE = 0.5  # probability from which a failure is told
+SURE = 0.5  # probability from which a failure is reported
 # Alarms in an hour without a failure, by benchmarks.watch_delay (seed 2, 100 runs).
 FALSE_ALARMS = 1.2
 POINTS = 1500  # of a line (chosen)
@@ -22,12 +22,12 @@ POINTS = 1500  # of a line (chosen)
 
 @dataclass(frozen=True)
 class Alarm:
-    """A stretch in which a failure is told.
+    """A stretch in which a failure is reported.
 
     Attributes:
         thruster: ``vsp`` or ``bow``.
         since: when it began [s], as the detector estimates when it is surest.
-        noticed, until: first and last time at which it is told [s].
+        noticed, until: first and last time at which it is reported [s].
         confidence: largest probability.
         lost: share of the force that is lost, then.
     """
@@ -41,7 +41,7 @@ class Alarm:
 
 
 def alarms(played: Played) -> list[Alarm]:
-    """All stretches in which a failure is told, the longest first."""
+    """All stretches in which a failure is reported, the longest first."""
     log, start = played.log, float(played.source.track.run.time[0])
     time = log["time"] + start
     found = []

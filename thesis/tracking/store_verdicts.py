@@ -52,9 +52,9 @@ def saturated(by_path: Paths) -> Verdict:
     """The effect of samples that were stored while the thrusters saturated."""
     numbers = []
     for path, table in by_path.items():
-        gated, told, untold = (error(table[c]) for c in ("true", "true, ungated", "true, request"))
+        gated, stated, untold = (error(table[c]) for c in ("true", "true, ungated", "true, request"))
         numbers += [
-            f"{path}, {n}: {x:.5f} m, with the clipped force {told[n]:.5f} m, with the gate "
+            f"{path}, {n}: {x:.5f} m, with the clipped force {stated[n]:.5f} m, with the gate "
             f"{gated[n]:.5f} m"
             for n, x in untold.items()
         ]
@@ -68,9 +68,9 @@ def saturated(by_path: Paths) -> Verdict:
 
 
 def _svd_suffers(table: Table) -> bool:
-    untold, told = error(table["true, request"]), error(table["true, ungated"])
+    untold, stated = error(table["true, request"]), error(table["true, ungated"])
     svd, win = ([f"{store}_{by}" for by in ("eps", "z2")] for store in ("svd", "win"))
-    return min(untold[n] for n in svd) > MUCH * max([untold[n] for n in win] + [told[n] for n in svd])
+    return min(untold[n] for n in svd) > MUCH * max([untold[n] for n in win] + [stated[n] for n in svd])
 
 
 def lack_of_rank(sway: float, signs: float) -> str:

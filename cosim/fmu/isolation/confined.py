@@ -110,7 +110,7 @@ class ConfinedFmu:
             named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
             yield f"It opened, or tried to open, {len(outside)} files outside of its own: {named}."
 
-    def told(self, error: Exception) -> str:
+    def stated(self, error: Exception) -> str:
         """What an error says, with the file of the FMU in place of its copy."""
         return str(error).replace(str(self._archive), str(self.model.path))
 

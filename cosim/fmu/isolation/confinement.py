@@ -65,8 +65,8 @@ class Confinement(NamedTuple):
         missing = [f"no namespaces ({self.namespaces})"] if self.namespaces else []
         missing += [] if self.version else [f"no Landlock ({self.landlock})"]
         own = ", ".join(["own process in an empty folder", *there])
-        told = "; ".join([own, *missing])
-        return told if there else f"unconfined: {told}"
+        stated = "; ".join([own, *missing])
+        return stated if there else f"unconfined: {stated}"
 
 
 def available(means: Sequence[str], trial: Callable[[Confinement], str]) -> Confinement:

@@ -288,9 +288,9 @@ class IsolatedInstance:
         """
         self._steps = sum(run.steps for run in runs)
         asked = [(dict(r.start), r.inputs.hex(), r.steps, [*r.terms]) for r in runs]
-        told = self._call(RUN, "whole_runs", asked, h)
+        stated = self._call(RUN, "whole_runs", asked, h)
         try:
-            found = [*map(bytes.fromhex, told)]
+            found = [*map(bytes.fromhex, stated)]
             sizes = [divmod(len(x), self._width) for x in found]
             whole = [not rest and 0 < n <= r.steps + 1 for r, (n, rest) in zip(runs, sizes, strict=True)]
         except (TypeError, ValueError):

@@ -104,12 +104,12 @@ class Worker:
 
     def _whole_runs(self, runs: list[Any], h: float) -> list[str]:
         """One after the other, with a reset between two."""
-        told = []
+        stated = []
         for k, (start, inputs, steps, terms) in enumerate(runs):
             if k:
                 self._reset()
-            told.append(self._whole_run(start, inputs, steps, terms, h))
-        return told
+            stated.append(self._whole_run(start, inputs, steps, terms, h))
+        return stated
 
     def _whole_run(
         self, start: dict[str, Value], inputs: str, steps: int, terms: list[FeedbackTerm], h: float
@@ -125,7 +125,12 @@ class Worker:
         self._instance.exit_initialization()
         self._access.get()
         driven, seen = self._inputs.cast("d"), self._outputs.cast("d")
-        told, before, put, step = bytearray(self._outputs), [*seen], self._access.put, self._access.step
+        stated, before, put, step = (
+            bytearray(self._outputs),
+            [*seen],
+            self._access.put,
+            self._access.step,
+        )
         for k in range(steps):
             self._inputs[:] = rows[k * width : (k + 1) * width]
             for slot, place, power, rate, coefficient, turn, phase in terms:
@@ -135,13 +140,13 @@ class Worker:
             before = seen.tolist()
             put()
             step(k * h)
-            told += self._outputs
+            stated += self._outputs
             for y in seen.tolist():
                 # Some tools integrate for hours once a state is infinite.
                 if not -DIVERGED < y < DIVERGED:
-                    return told.hex()
+                    return stated.hex()
         self._instance.terminate()
-        return told.hex()
+        return stated.hex()
 
     def _reset(self) -> None:
         self._instance.reset(self._listener)

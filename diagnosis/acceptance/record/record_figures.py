@@ -23,20 +23,20 @@ def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) 
         if j.found is None:
             continue
         c = j.criterion
-        told = f"{c.title}: error E = S − D of each of the {j.found.errors.size} windows that count"
-        yield Plot(_errors(c, j.found), f"{told}, the tolerance, and 2 u_val about zero.")
+        stated = f"{c.title}: error E = S − D of each of the {j.found.errors.size} windows that count"
+        yield Plot(_errors(c, j.found), f"{stated}, the tolerance, and 2 u_val about zero.")
         if c.horizon in drawn or not evaluations:
             continue
         drawn.add(c.horizon)
         for p, rows in j.windows[:SHOWN]:
             more = f" (of {len(j.windows)} runs the first {SHOWN})" if len(j.windows) > SHOWN else ""
-            told = (
+            stated = (
                 f"{p.name}: measured track, and predictions over {c.horizon:g} s from the start of each "
                 "window"
             )
             yield Plot(
                 _track(by_name[p.name], p.predictions),
-                f"{told}, of which {int(rows.sum())} count{more}.",
+                f"{stated}, of which {int(rows.sum())} count{more}.",
             )
 
 

@@ -43,13 +43,13 @@ def write_record(
 
 def _head(r: Content) -> Mapping[str, str]:
     """What stands on page one of the PDF above the verdict."""
-    told = r.particulars
+    stated = r.particulars
     return {
-        "document": told.document,
-        "client": told.client,
-        "assessor": told.assessor,
-        "model": f"{r.model} ({told.model}, version {told['model version']})",
-        "ship": f"{r.ship} ({told.ship})",
+        "document": stated.document,
+        "client": stated.client,
+        "assessor": stated.assessor,
+        "model": f"{r.model} ({stated.model}, version {stated['model version']})",
+        "ship": f"{r.ship} ({stated.ship})",
         "made": f"{r.made}, by cybership {r.code.version}",
         "runs": ", ".join(s.run for s in r.samples),
     }

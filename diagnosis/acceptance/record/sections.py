@@ -21,9 +21,9 @@ def sections(r: Content) -> Iterator[ReportSection]:
     yield _judged(r)
     yield _errors(r)
     yield _uncertainty(r)
-    told = [(name, text) for name, text in r.particulars.items()]
+    stated = [(name, text) for name, text in r.particulars.items()]
     purpose = [f"Intended use: {r.criteria.purpose or 'not given'}. As the criteria state:"]
-    yield ReportSection("Particulars", purpose, [Table(("", ""), told, words=True)])
+    yield ReportSection("Particulars", purpose, [Table(("", ""), stated, words=True)])
     heads = ("criterion", "signal", "unit", "least", "5 %", "50 %", "95 %", "greatest")
     covered = [(v.criterion, v.signal, v.unit, *map(number, [*v.values()][3:])) for v in r.validity]
     text = "Range of the judged windows: minimum, quantiles and maximum of their samples."
@@ -68,21 +68,21 @@ def _judged(r: Content) -> ReportSection:
         rows.append((j.criterion, str(j.offered), why, str(j.windows), runs))
     heads = ("criterion", "windows offered", "excluded", "judged", "runs that count")
     left = dict.fromkeys(f"{n}: {why}" for j in r.judgements for n, why in j.left_out.items())
-    told = [f"{j.criterion}: {'; '.join(j.restrictions)}." for j in r.judgements if j.restrictions]
-    told += [f"Runs that do not count: {'; '.join(left)}."] if left else []
-    told += [f"The same motion, or nearly: {' and '.join(pair)}." for pair in r.same_runs]
-    told += [
+    stated = [f"{j.criterion}: {'; '.join(j.restrictions)}." for j in r.judgements if j.restrictions]
+    stated += [f"Runs that do not count: {'; '.join(left)}."] if left else []
+    stated += [f"The same motion, or nearly: {' and '.join(pair)}." for pair in r.same_runs]
+    stated += [
         f"{s.run}: {s.samples} samples, of which {s.used} are used, {s.frozen} frozen, {s.dropped} "
         f"dropped, {s.spikes} spikes.{''.join(f' {note}.' for note in s.notes)}"
         for s in r.samples
     ]
     known = ", ".join(f.name for f in r.learned_from)
-    told.append(
+    stated.append(
         f"The model was learned from: {known}."
         if known
         else "The file of the model does not name its training runs."
     )
-    return ReportSection("Judged model and data", told, [Table(heads, rows, words=True)])
+    return ReportSection("Judged model and data", stated, [Table(heads, rows, words=True)])
 
 
 def _errors(r: Content) -> ReportSection:
@@ -98,13 +98,13 @@ def _errors(r: Content) -> ReportSection:
         )
         for j in r.judgements
     ]
-    told = (
+    stated = (
         "E = S − D is predicted minus measured at the horizon, as the mean over windows. For "
         "position it is the mean distance, and the mean error forward and to starboard. Bounds of "
         "the share, or of the RMS, are one-sided at the confidence of the criterion."
     )
     heads = ("criterion", "unit", "tolerance", "E", "forward, starboard", "RMS", "largest", "windows")
-    return ReportSection("Comparison error", [told], [Table((*heads, "share or RMS"), rows)])
+    return ReportSection("Comparison error", [stated], [Table((*heads, "share or RMS"), rows)])
 
 
 def _uncertainty(r: Content) -> ReportSection:
@@ -117,14 +117,14 @@ def _uncertainty(r: Content) -> ReportSection:
         for j in r.judgements
         if j.budget is not None
     ]
-    told = (
+    stated = (
         "Standard uncertainties of the judged quantity at the horizon. u_val² = u_num² + u_input² "
         "+ u_D², where u_input² includes initial state, parameters, process noise, current and "
         "wind. Unknown contributions are left out, so u_val is a lower bound. u_num is by "
         "Richardson's extrapolation."
     )
     heads = ("criterion", "unit", *(CALLED.get(name, name) for name in SOURCES))
-    return ReportSection("Uncertainty", [told], [Table(heads, rows)])
+    return ReportSection("Uncertainty", [stated], [Table(heads, rows)])
 
 
 def _origin(r: Content) -> ReportSection:
@@ -150,5 +150,5 @@ def _origin(r: Content) -> ReportSection:
         ),
         ("signed", "no" if r.public_key is None else r.public_key),
     ]
-    told = r.fmu["sentences"] if r.fmu else []
-    return ReportSection("Made with", told, [Table(("", ""), rows, words=True)])
+    stated = r.fmu["sentences"] if r.fmu else []
+    return ReportSection("Made with", stated, [Table(("", ""), rows, words=True)])

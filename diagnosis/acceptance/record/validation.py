@@ -218,11 +218,11 @@ class _JudgedRuns:
         self._learned, self._acting, self._notes = learned, acting, notes
         self.short: dict[float, dict[str, int]] = {}
         prints = {e.name: Fingerprint.of(e.smoothed) for e in comparison.evaluations}
-        told = [*comparison.predictor.model.learned_from, *(learned.learned_from if learned else ())]
-        told += [
+        stated = [*comparison.predictor.model.learned_from, *(learned.learned_from if learned else ())]
+        stated += [
             prints[e.name] for e in comparison.evaluations if e.learned is not None and not e.held_out
         ]
-        self.learned_from = [*{f.sha256: f for f in told}.values()]
+        self.learned_from = [*{f.sha256: f for f in stated}.values()]
         rows = {e.name: _rows(e.weak_windows.run.pose) for e in comparison.evaluations}
         self.same = [
             {a, b} for a, b in combinations(prints, 2) if rows[a] & rows[b] or prints[a].alike(prints[b])

@@ -144,9 +144,9 @@ def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) 
 def _code(content: Record) -> Check:
     here, there = code(), content.code
     same = there.sha256 == here["sha256"]
-    told = f"code: cybership {there.version}, SHA-256 {there.sha256}"
+    stated = f"code: cybership {there.version}, SHA-256 {there.sha256}"
     return Check(
-        True if same else None, f"{told}: {'the same as' if same else 'different from'} here", CODE
+        True if same else None, f"{stated}: {'the same as' if same else 'different from'} here", CODE
     )
 
 
@@ -155,7 +155,7 @@ def _names(f: HashedFile) -> list[str]:
 
 
 def _check(f: HashedFile, folder: Path, files: Collection[HashedFile]) -> Check:
-    told, name = f"{f.role}: {printable(f.path)}", Path(f.path).name
+    stated, name = f"{f.role}: {printable(f.path)}", Path(f.path).name
     names, copy = "\n".join(_names(f)), (folder / name).resolve()
     named = {(folder / f.path).resolve(), Path(f.path).resolve()}
     places = named if name in OUTPUTS else {*named, copy}
@@ -167,5 +167,7 @@ def _check(f: HashedFile, folder: Path, files: Collection[HashedFile]) -> Check:
     wrong = [p for p, h in found.items() if h != f.sha256 and (p in named or h not in others)]
     found = {place: h for place, h in found.items() if h == f.sha256}
     if wrong:
-        return Check(False, f"{told}: differs ({', '.join(map(str, wrong))})")
-    return Check(True if found else None, f"{told}: {'the same' if found else 'not found here'}", names)
+        return Check(False, f"{stated}: differs ({', '.join(map(str, wrong))})")
+    return Check(
+        True if found else None, f"{stated}: {'the same' if found else 'not found here'}", names
+    )

@@ -298,9 +298,9 @@ def _amount(axis: str, r: AxisRemainder) -> str:
         "initial model error": 100.0 * np.sqrt(r.share),
         "commanded force": 100.0 * r.of_command,
     }
-    told = [f", {share:.2g} % of the {whole}" for whole, share in shares.items() if share < 99.5]
+    stated = [f", {share:.2g} % of the {whole}" for whole, share in shares.items() if share < 99.5]
     size = f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]}"
-    return f"{size} (uncertainty {number(r.uncertainty, 1)}{''.join(told)})"
+    return f"{size} (uncertainty {number(r.uncertainty, 1)}{''.join(stated)})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:

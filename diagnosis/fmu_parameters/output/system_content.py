@@ -169,7 +169,7 @@ class CalibrationReport:
             for n, v in own.items()
         }
         units = {v.unit.name: v.unit for n in own if (v := self.model.variables[n]).unit is not None}
-        told = {
+        stated = {
             name: {
                 **{b: float(e) for b, e in zip(cosim.BASE_UNITS, u.exponents or (), strict=False) if e},
                 "factor": u.factor,
@@ -181,7 +181,7 @@ class CalibrationReport:
         name = self.model.name
         cosim.write_parameters(
             folder / "model.ssv",
-            cosim.ParameterSet(values={name: values} if values else {}, units=told, name="calibrated"),
+            cosim.ParameterSet(values={name: values} if values else {}, units=stated, name="calibrated"),
         )
         write_json(folder / "posterior.json", self._posterior() | {"task": self.made_of})
         sections = [*self._sections(plots)]

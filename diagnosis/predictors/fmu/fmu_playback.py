@@ -109,7 +109,7 @@ class Playback:
             if not self._redoes:
                 self._redoes = True
                 return self.run(prediction)
-            return PlayedBack(self._nothing(prediction), self._fmu.told(error))
+            return PlayedBack(self._nothing(prediction), self._fmu.stated(error))
 
     def run_each(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions; many at once where nothing but a reset is between them."""
@@ -125,11 +125,11 @@ class Playback:
         if not self._resets or self._fmu.timeout is not None or any(p.h != h for p in predictions):
             return []
         try:
-            told = self._ready(h).whole_runs([self._asked(p) for p in predictions], h)
+            stated = self._ready(h).whole_runs([self._asked(p) for p in predictions], h)
         except SimulationError:
             self.close()
             return []
-        outputs = [np.frombuffer(x).reshape(-1, len(self.outputs)) for x in told]
+        outputs = [np.frombuffer(x).reshape(-1, len(self.outputs)) for x in stated]
         pairs = zip(predictions, outputs, strict=True)
         if all(len(y) == len(p.inputs) + 1 and np.isfinite(y).all() for p, y in pairs):
             return [*map(PlayedBack, outputs)]
@@ -176,8 +176,8 @@ class Playback:
 
     def _run(self, prediction: PlaybackRequest) -> PlayedBack:
         h, outputs = prediction.h, self._nothing(prediction)
-        (told,) = self._ready(h).whole_runs([self._asked(prediction)], h)
-        known = np.frombuffer(told).reshape(-1, len(self.outputs))
+        (stated,) = self._ready(h).whole_runs([self._asked(prediction)], h)
+        known = np.frombuffer(stated).reshape(-1, len(self.outputs))
         outputs[: len(known)] = known
         fine = bool(np.isfinite(outputs).all())
         if self._resets is False or not fine:  # a reset may not cure what has failed
@@ -221,8 +221,8 @@ class Processes:
         with ThreadPoolExecutor(count, "playback") as threads:
             try:
                 parts = [predictions[k::count] for k in range(count)]
-                told = threads.map(Playback.run_each, self._playbacks, parts)
-                for k, part in enumerate(told):
+                stated = threads.map(Playback.run_each, self._playbacks, parts)
+                for k, part in enumerate(stated):
                     found[k::count] = part
                 return found
             except BaseException:  # such as Ctrl-C: predictions that are under way end with the FMU

@@ -88,7 +88,7 @@ class Fmu:
             # Of an archive the parts are unpacked for a while, and hashed with it.
             self.inner = inner if self._given.suffix == ".json" else ()
         self.map = None if map is None else Path(map)
-        self.told = None if self.map is None else read_map(self.map)
+        self.stated = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)
         self.start = None if ship is None else Model(ship=ship)
 
@@ -125,8 +125,8 @@ class Fmu:
     @property
     def fixed_step(self) -> float | None:
         """The only step that it takes, or that is asked for [s]; None: it takes steps of any length."""
-        told = self.model.description.coSimulation
-        varies = told is not None and told.canHandleVariableCommunicationStepSize
+        stated = self.model.description.coSimulation
+        varies = stated is not None and stated.canHandleVariableCommunicationStepSize
         return self.step if self.execution.step or not varies else None
 
     @property
@@ -136,7 +136,7 @@ class Fmu:
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
         """The map of the file, else the one from names and units, for some runs."""
-        return self.told or propose(self.model, commands_of(runs))
+        return self.stated or propose(self.model, commands_of(runs))
 
     def variables(self, runs: Sequence[Run]) -> VariableMap:
         """The map by which the FMU predicts some runs, with the units of its variables.
@@ -188,7 +188,7 @@ class FmuPredictor(BlackBox):
     """How an FMU predicts some runs.
 
     Attributes:
-        given: which of its variables is which signal, as it was told or proposed.
+        given: which of its variables is which signal, as it was stated or proposed.
         map: the same with the units that the FMU declares.
         lines: see :func:`.variable_map.signal_lines`.
         confinement: what confines its processes, in words; "unconfined" where nothing does.
@@ -208,15 +208,15 @@ class FmuPredictor(BlackBox):
         self.fmu, self.confined, self.confinement = fmu, process, process.confinement
         self.given, self.map = maps
         inputs, outputs = (
-            tuple(dict.fromkeys(c.name for c in self.map.told(g).values()))
+            tuple(dict.fromkeys(c.name for c in self.map.stated(g).values()))
             for g in ("inputs", "outputs")
         )
         self.processes = Processes(process, inputs, outputs, fresh=True)
         self.learned_from = fmu.learned_from
         self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         self.lines = signal_lines(self.map, commands_of([w.run for w in runs]))
-        self.starts = frozenset(self.map.told("start")) & set(MOTION)
-        self.inputs = frozenset(self.map.told("inputs"))
+        self.starts = frozenset(self.map.stated("start")) & set(MOTION)
+        self.inputs = frozenset(self.map.stated("inputs"))
         self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
 
     @property
@@ -225,14 +225,14 @@ class FmuPredictor(BlackBox):
 
     @property
     def placed(self) -> bool:
-        return not set(POSE) <= self.map.told("outputs").keys() & self.starts
+        return not set(POSE) <= self.map.stated("outputs").keys() & self.starts
 
     @cached_property
     def late(self) -> list[str]:
         """The outputs that are zero until the first step, against their start values."""
         w = self.runs[0]
         sizes = dict(zip(MOTION, (w.scale.length, w.scale.length, 1.0, *w.scale.speeds), strict=True))
-        started = [s for s in MOTION if s in self.starts & self.map.told("outputs").keys()]
+        started = [s for s in MOTION if s in self.starts & self.map.stated("outputs").keys()]
         if not started:
             return []
         state = np.where(w.known[:, None], np.hstack([w.smoothed.eta, w.smoothed.nu]), 0.0)
@@ -261,8 +261,8 @@ class FmuPredictor(BlackBox):
         own = self.fmu.fixed_step or h
         count = steps if own == h else int(np.ceil(steps * h / own - 1e-9))
         motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
-        for signal, told in self._told(smoothed, rows, own, max(count, 3 if self.late else 1)).items():
-            x = np.unwrap(told, axis=0) if signal == "psi" else told
+        for signal, stated in self._told(smoothed, rows, own, max(count, 3 if self.late else 1)).items():
+            x = np.unwrap(stated, axis=0) if signal == "psi" else stated
             if self.late:
                 x[0] = 3.0 * (x[1] - x[2]) + x[3]
             if own != h:
@@ -276,8 +276,8 @@ class FmuPredictor(BlackBox):
         if fault := next((p.fault for p in found if p.fault), ""):
             where = f"'{self.name}' failed on run '{smoothed.track.run.name}'"
             raise cosim.InputError(f"{where}: {fault}")
-        told = np.stack([p.outputs for p in found], axis=2)
-        return self._outputs(dict(zip(self.processes.outputs, told.transpose(1, 0, 2), strict=True)))
+        stated = np.stack([p.outputs for p in found], axis=2)
+        return self._outputs(dict(zip(self.processes.outputs, stated.transpose(1, 0, 2), strict=True)))
 
     def requests(
         self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int
@@ -303,7 +303,7 @@ class FmuPredictor(BlackBox):
 
     @property
     def _started_by(self) -> str:
-        return f", by {', '.join(c.name for c in self.map.told('start').values())}"
+        return f", by {', '.join(c.name for c in self.map.stated('start').values())}"
 
     def description(self) -> PredictorDescription:
         outside = tuple(self.confined.outside)
@@ -333,21 +333,21 @@ class FmuPredictor(BlackBox):
             write_map(folder / MAP, self.given.content())
             return []
         wrapped = Wrapped(self.name, self.confined.model, self.map, self.lines)
-        told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
+        stated, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
         if of_both is not None:
             remember(folder / FOUND, self.learned_from, runs)
         write_map(folder / MAP, (of_both or self.given).content())
-        return [told]
+        return [stated]
 
     def of_variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
         """Variable -> its values, for those of some signals [SI] that a group of the map has."""
-        lines, told = self.lines[group], self.map.told(group)
-        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
+        lines, stated = self.lines[group], self.map.stated(group)
+        known = ((signals[s], lines[s], c.name) for s, c in stated.items() if s in signals)
         return {name: (x - line.offset) / line.gain for x, line, name in known}
 
     def _outputs(self, values: Signals) -> dict[str, np.ndarray]:
         """Signal -> its values [SI], by variables' values; also of those that stay the same."""
-        lines, columns = self.lines["outputs"], self.map.told("outputs")
+        lines, columns = self.lines["outputs"], self.map.stated("outputs")
         found = {s: lines[s].gain * values[c.name] + lines[s].offset for s, c in columns.items()}
         like = next(iter(values.values()))
         return found | {s: np.full(like.shape, x) for s, x in self.map.fixed.items()}

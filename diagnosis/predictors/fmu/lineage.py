@@ -32,10 +32,10 @@ def learned_from(paths: Iterable[Path]) -> tuple[Fingerprint, ...]:
             if LEARNED not in archive.namelist():
                 continue
             try:
-                told = json.loads(archive.read(LEARNED))
+                stated = json.loads(archive.read(LEARNED))
             except (ValueError, RecursionError):
-                told = [{}]
-        found += fingerprints(told, path)
+                stated = [{}]
+        found += fingerprints(stated, path)
     return tuple(found)
 
 
@@ -82,6 +82,6 @@ def _told(path: Path) -> str | None:
 def _of_fmu(path: Path) -> str | None:
     """The ship that the vessel of this project names in its description, if there is such a ship."""
     annotations = FmuModel(path).annotations
-    told = None if annotations is None else annotations.find("Tool[@name='cybership']/Ship")
-    name = None if told is None else told.get("name")
+    stated = None if annotations is None else annotations.find("Tool[@name='cybership']/Ship")
+    name = None if stated is None else stated.get("name")
     return name if name in shipped_ships() else None

@@ -1,4 +1,4 @@
-"""Which variable of an FMU is which signal of a run: told by names and units, or by a map file.
+"""Which variable of an FMU is which signal of a run: known by names and units, or by a map file.
 
 A map has the form of the file next to a measurement, once for inputs, outputs and start values::
 
@@ -67,7 +67,7 @@ class VariableMap(BaseModel):
         default=None, description="time before the comparison of a whole run begins [s]"
     )
 
-    def told(self, group: str) -> dict[str, Column]:
+    def stated(self, group: str) -> dict[str, Column]:
         """The signals of a group that have a variable."""
         every: Mapping[str, Column | float | None] = getattr(self, group)
         return {signal: column for signal, column in every.items() if isinstance(column, Column)}
@@ -80,16 +80,16 @@ class VariableMap(BaseModel):
     @property
     def known(self) -> set[str]:
         """The outputs that have a variable, or stay the same."""
-        return {*self.told("outputs"), *self.fixed}
+        return {*self.stated("outputs"), *self.fixed}
 
     def content(self) -> dict[str, Any]:
         """As JSON holds it: a signal with the name of its variable alone, where no more is to tell."""
-        told = self.model_dump(exclude_defaults=True)
-        for group in (g for g in GROUPS if g in told):
-            for signal, column in told[group].items():
+        stated = self.model_dump(exclude_defaults=True)
+        for group in (g for g in GROUPS if g in stated):
+            for signal, column in stated[group].items():
                 if isinstance(column, dict) and column.keys() == {"name"}:
-                    told[group][signal] = column["name"]
-        return told
+                    stated[group][signal] = column["name"]
+        return stated
 
 
 def read_map(path: Path) -> VariableMap:
@@ -126,7 +126,7 @@ def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dic
         return Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
 
     known = quantities(commands)
-    return {g: {s: line(c, known[g][s]) for s, c in map.told(g).items()} for g in GROUPS}
+    return {g: {s: line(c, known[g][s]) for s, c in map.stated(g).items()} for g in GROUPS}
 
 
 def propose(model: FmuModel, commands: Mapping[str, str]) -> VariableMap:
@@ -156,8 +156,8 @@ def propose(model: FmuModel, commands: Mapping[str, str]) -> VariableMap:
 
 
 def _column(v: FmuVariable, m: Meant) -> Column:
-    told = m.unit or (v.unit.name if v.unit else "rad")
-    quarter = pi / 2.0 / UNITS["angle"].get(told, 1.0) if m.quarter else 0.0
+    stated = m.unit or (v.unit.name if v.unit else "rad")
+    quarter = pi / 2.0 / UNITS["angle"].get(stated, 1.0) if m.quarter else 0.0
     return Column(name=v.name, unit=m.unit, flip=m.flip, offset=quarter)
 
 
@@ -179,7 +179,7 @@ def completed(
     for group, known in quantities(commands).items():
         variables = {v.name: v for v in _candidates(model, group)}
         found[group] = dict(given.fixed) if group == "outputs" else {}
-        for signal, column in given.told(group).items():
+        for signal, column in given.stated(group).items():
             place = f"{where}: {group}.{signal}"
             if signal not in known:
                 raise InputError(f"{place} is not a signal of these runs{nearest(signal, known)}")
@@ -202,7 +202,7 @@ def unmatched(found: VariableMap, model: FmuModel) -> list[str]:
     if not any(set(group) <= outputs for group in (POSE, VELOCITY)):
         missing = [s for s in (POSE if outputs & {"x", "y"} else MOTION) if s not in outputs]
         lacking.append(f"no output is {_with_hints(missing, model, 'outputs')}")
-    if not found.told("inputs"):
+    if not found.stated("inputs"):
         lacking.append(f"no input is {_with_hints(found.inputs, model, 'inputs')}")
     return lacking
 
@@ -210,8 +210,8 @@ def unmatched(found: VariableMap, model: FmuModel) -> list[str]:
 def _with_hints(signals: Iterable[str], model: FmuModel, group: str) -> str:
     known = [v.name for v in _candidates(model, group)]
     near = {signal: most_alike(signal, known) for signal in signals}
-    told = ", ".join(s if n is None else f"{s} (near: '{n}')" for s, n in near.items())
-    return f"{told}; its {group} are {', '.join(known[:8]) or 'none'}{', ...' if known[8:] else ''}"
+    stated = ", ".join(s if n is None else f"{s} (near: '{n}')" for s, n in near.items())
+    return f"{stated}; its {group} are {', '.join(known[:8]) or 'none'}{', ...' if known[8:] else ''}"
 
 
 def _candidates(model: FmuModel, group: str) -> list[FmuVariable]:

@@ -60,7 +60,7 @@ def write_wrapper(
     """
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
     needed = ~np.isclose(np.abs(change).max(axis=0) / start.ship.scale.forces, 0.0)
-    takes = {*fmu.map.told("inputs"), *fmu.map.told(DISTURBANCES)}
+    takes = {*fmu.map.stated("inputs"), *fmu.map.stated(DISTURBANCES)}
     takes |= {*FORCE[:2]} if {"tau.force", "tau.angle"} <= takes else set()
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
@@ -80,14 +80,14 @@ def write_wrapper(
 
 def _write(path: Path, fmu: Wrapped, start: Model, learned: Model, runs: Sequence[WeakWindows]) -> None:
     """Write the two, wired; values pass as they are, for the addition converts them."""
-    groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", DISTURBANCES)}
+    groups = {group: fmu.map.stated(group) for group in ("outputs", "inputs", DISTURBANCES)}
     lines = {g: {_plain(s): line for s, line in fmu.lines[g].items()} for g in groups}
-    told: dict[str, Line | float] = {**lines["outputs"], **fmu.map.fixed}
+    stated: dict[str, Line | float] = {**lines["outputs"], **fmu.map.fixed}
     parts = [
         {part: {n: float(x) for n, x in getattr(m, part).items()} for part in ("vessel", "thrusters")}
         for m in (start, learned)
     ]
-    arguments = (*parts, told, lines["inputs"], lines[DISTURBANCES])
+    arguments = (*parts, stated, lines["inputs"], lines[DISTURBANCES])
     text = ", ".join(map(repr, arguments))
     source = SOURCE.format(name=fmu.name, description=start.ship.description, arguments=text)
     wires = [(f"{FOREIGN}.{c.name}", f"{ADDED}.from_{s}") for s, c in groups["outputs"].items()]
@@ -106,7 +106,7 @@ def _plain(signal: str) -> str:
 
 
 def _start_values(fmu: Wrapped) -> list[str]:
-    parameters = (fmu.model.variables[c.name] for c in fmu.map.told("start").values())
+    parameters = (fmu.model.variables[c.name] for c in fmu.map.stated("start").values())
     return [f"{FOREIGN}.{v.name}" for v in parameters if v.causality == "parameter"]
 
 
@@ -117,10 +117,10 @@ def _map(fmu: Wrapped) -> VariableMap:
         return {s: c.model_copy(update={"name": f"{FOREIGN}.{c.name}"}) for s, c in columns.items()}
 
     exposed = _start_values(fmu)
-    start = inside(fmu.map.told("start"))
+    start = inside(fmu.map.stated("start"))
     return VariableMap(
-        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in fmu.map.told("inputs")},
-        outputs={**inside(fmu.map.told("outputs")), **fmu.map.fixed},
+        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in fmu.map.stated("inputs")},
+        outputs={**inside(fmu.map.stated("outputs")), **fmu.map.fixed},
         start={s: c for s, c in start.items() if c.name in exposed},
         run_in=fmu.map.run_in,
     )

@@ -132,10 +132,10 @@ def _by_words(
             only["shaft speed"].append(Column(name=name, unit=unit))
         elif unit in UNITS["angle"] and is_steering(own):
             only["angle"].append(Column(name=name, unit=unit))
-    for kind, told in only.items():
+    for kind, stated in only.items():
         left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
-        bare = [c for c in told if names_no_other_machine(c.name)]
-        of_one = _orders(bare or told)
+        bare = [c for c in stated if names_no_other_machine(c.name)]
+        of_one = _orders(bare or stated)
         if len(left) == len(of_one) == 1:
             found[left[0]] = of_one
     # Beside a command its sign may have a column, as rudder_dir beside rudder_deg.

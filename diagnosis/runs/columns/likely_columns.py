@@ -81,8 +81,8 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 
     Args:
         name: of the column, without its unit.
-        unit: of the column; without one only an angle is told, as in ``HDT heading``, or an actuator's
-            command, as in ``port/n_cmd``, ``port angle``, or ``rudder`` where that has one command.
+        unit: of the column; without one only an angle is recognised, as in ``HDT heading``, or a
+            command of an actuator, as in ``port/n_cmd``, ``port angle``, or ``rudder`` of one command.
         quantity: signal -> quantity.
     """
     words = words_of(name)
@@ -124,8 +124,8 @@ def is_steering(name: str) -> bool:
 
 def is_of_shaft(name: str, unit: str) -> bool:
     """Whether a name and its unit are those of revolutions, of whatever shaft."""
-    told = unit in UNITS["shaft speed"] and not REVOLUTIONS.isdisjoint(words_of(name))
-    return told or unit in ("rpm", "rps")
+    stated = unit in UNITS["shaft speed"] and not REVOLUTIONS.isdisjoint(words_of(name))
+    return stated or unit in ("rpm", "rps")
 
 
 def names_no_other_machine(name: str) -> bool:
@@ -227,9 +227,9 @@ def likely_columns(
         motion: of :func:`motion_of`.
     """
     found = [
-        LikelyColumn(name, *told)
+        LikelyColumn(name, *stated)
         for name, (bare, unit, values) in named.items()
-        if (told := _evidence(signal, quantity, bare, unit, values, motion))
+        if (stated := _evidence(signal, quantity, bare, unit, values, motion))
     ]
     return sorted(found, key=lambda c: -c.score)[:SHOWN]
 

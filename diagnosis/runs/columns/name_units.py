@@ -20,10 +20,10 @@ OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
 def bare_name(name: str, below: str) -> tuple[str, str]:
     """A column's name without its unit, and the unit, which may stand below it."""
     name = OF_LIBCOSIM.sub("", name)
-    told = WITH_UNIT.fullmatch(name)
-    if told and told[2].casefold() in NORTH:
-        return told[1], bare_unit(below)
-    return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
+    stated = WITH_UNIT.fullmatch(name)
+    if stated and stated[2].casefold() in NORTH:
+        return stated[1], bare_unit(below)
+    return (stated[1], spelt(stated[2])) if stated else (name, bare_unit(below))
 
 
 def without_unit(name: str, below: str) -> tuple[str, str]:

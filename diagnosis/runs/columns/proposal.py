@@ -86,7 +86,7 @@ class Proposal(NamedTuple):
 
 
 def propose(path: Path, of: Ship | None = None) -> Proposal:
-    """Look at a file: its text, its names and units, and at the numbers where units are not told.
+    """Look at a file: its text, its names and units, and at the numbers where units are not stated.
 
     Args:
         path: a CSV, Parquet or MATLAB file; what is stated beside it stands.
@@ -137,7 +137,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
-    told = {s: layout.column(s).unit for s in quantity}
+    reported = {s: layout.column(s).unit for s in quantity}
     columns |= units_of_commands(table, layout, of)
     columns |= sign_columns(table, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
@@ -149,7 +149,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
-    by_numbers = {s: _by(c) for s, c in columns.items() if c.unit and c.unit != told[s]}
+    by_numbers = {s: _by(c) for s, c in columns.items() if c.unit and c.unit != reported[s]}
     return Proposal(layout, unused, read(path, layout, of), by_numbers=by_numbers)
 
 
@@ -365,8 +365,8 @@ def _likely(
     pose = {s: to_si(numbers[s], s, c, quantity[s]) for s, c in known.items()}
     pose |= layout.even_time(len(own))
     kind = "time" if "time" in blank else ""
-    told = {n: without_unit(n, below) for n, below in unused.items()}
-    told = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in told.items()}
-    named = {n: (*pair, numbers_of(own[n], kind)) for n, pair in told.items()}
+    reported = {n: without_unit(n, below) for n, below in unused.items()}
+    reported = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in reported.items()}
+    named = {n: (*pair, numbers_of(own[n], kind)) for n, pair in reported.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}

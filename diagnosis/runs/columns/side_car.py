@@ -67,9 +67,9 @@ def line_beside(
     if path is None or path.is_dir() or published or not changes:
         return ""
     # What that file does not state yet has to be there, too: with it names tell no units.
-    told = stated_layout(path) == read_as
-    text = Layout() if told else read_as
-    columns = {} if told else as_json(read_as).get("columns", {})
+    stated = stated_layout(path) == read_as
+    text = Layout() if stated else read_as
+    columns = {} if stated else as_json(read_as).get("columns", {})
     for signal, change in changes.items():
         column, offset = read_as.column(change.name), change.offset
         sign, factor = math.copysign(1.0, change.factor), abs(change.factor)
@@ -96,10 +96,10 @@ def line_beside(
 
 def as_json(layout: Layout) -> dict[str, Any]:
     """The content of the file beside a measurement, without what need not be said."""
-    told = layout.model_dump(exclude_defaults=True)
-    for signal, column in told.get("columns", {}).items():
-        told["columns"][signal] = column["name"] if column.keys() == {"name"} else column
-    return told
+    stated = layout.model_dump(exclude_defaults=True)
+    for signal, column in stated.get("columns", {}).items():
+        stated["columns"][signal] = column["name"] if column.keys() == {"name"} else column
+    return stated
 
 
 def _changed(path: Path, layout: Layout, **changes: Any) -> str:
@@ -155,9 +155,9 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
     if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
         return
     if numbers.iloc[0].isna().all():
-        told = quoted(", ".join(cells.iloc[0]))
+        stated = quoted(", ".join(cells.iloc[0]))
         raise InputError(
-            f"'{path}' has a line of units below the names ({told}); "
+            f"'{path}' has a line of units below the names ({stated}); "
             f"{_changed(path, layout, units_line=True)}, with the units of "
             'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
         )

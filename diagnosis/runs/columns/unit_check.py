@@ -214,7 +214,7 @@ def part_of_degree(pose: np.ndarray) -> float:
 
 
 def part_by_span(angle: np.ndarray) -> float | None:
-    """The part of a degree that an angle (n,) is in that is anywhere in a turn; None: it is not told.
+    """The part of a degree that an angle (n,) is in that is anywhere in a turn; None: it is not known.
 
     An angle that jumps as it likes spans hardly less than the counts of a turn, or less than 360.
     """

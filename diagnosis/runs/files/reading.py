@@ -180,8 +180,8 @@ def read(
     is_log = path.name in LOGS
     name = path.absolute().parent.name if is_log else path.stem
     of = of or ship()
-    told = [path.with_name(LOG_OPTIONS)] if is_log and path.with_name(LOG_OPTIONS).is_file() else []
-    hashes = {file: sha256(file) for file in (path, *side_cars(path), *told)}
+    stated = [path.with_name(LOG_OPTIONS)] if is_log and path.with_name(LOG_OPTIONS).is_file() else []
+    hashes = {file: sha256(file) for file in (path, *side_cars(path), *stated)}
     if path.suffix == ".mat" and fits_matlab(of):
         return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path, hashes=hashes)
     table, layout = _tabular(path, layout, of, set(also))
@@ -317,8 +317,8 @@ def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame,
         return table, []
     stamps = date_stamps(table[name])
     words &= True if stamps is None else np.isnan(stamps)  # as of "Dec 31, 2026 23:59"
-    told = _told(table[name], words, "row", "with words in place of a time, left out")
-    return table.loc[~words], told  # the others keep their numbers, for messages
+    stated = _told(table[name], words, "row", "with words in place of a time, left out")
+    return table.loc[~words], stated  # the others keep their numbers, for messages
 
 
 def _without_marks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[str]]:
@@ -500,12 +500,12 @@ def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
     Raises:
         InputError: they are of several ships.
     """
-    told = {path: log.ship or log.outline.name for path, log in _logs(paths).items() if log.outline}
-    ships = dict.fromkeys(told.values())
+    stated = {path: log.ship or log.outline.name for path, log in _logs(paths).items() if log.outline}
+    ships = dict.fromkeys(stated.values())
     if len(ships) > 1:
-        each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
+        each = ", ".join(f"'{path}' of {ship}" for path, ship in stated.items())
         raise InputError(f"the runs are of several ships: {each}")
-    first = next(iter(told.items()), None)
+    first = next(iter(stated.items()), None)
     return None if first is None or first[1] == DEFAULT else (first[1], first[0])
 
 
@@ -516,7 +516,7 @@ def ships_of_logs(paths: Iterable[Path]) -> dict[Path, str]:
 
 
 def _logs(paths: Iterable[Path]) -> dict[Path, RunOptions]:
-    """What is told beside each of some runs; of those that are no logs nothing."""
+    """What is stated beside each of some runs; of those that are no logs nothing."""
     return {path: read_options(path if path.is_dir() else path.parent) for path in paths}
 
 

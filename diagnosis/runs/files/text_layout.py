@@ -87,11 +87,11 @@ def bare_unit(text: str) -> str:
 
 def plain_number(cell: str) -> str:
     """A number as Python reads it, of other spellings: – 1, (1), 1.0D+01, '1, ="1"; else the cell."""
-    told = NUMBER.fullmatch(cell.strip("\u00a0 '=\""))
-    if told is None or (told["before"] == "(") != (told["behind"] == ")"):
+    stated = NUMBER.fullmatch(cell.strip("\u00a0 '=\""))
+    if stated is None or (stated["before"] == "(") != (stated["behind"] == ")"):
         return cell
-    sign = "-" if told["before"] not in ("", "+") else ""
-    return f"{sign}{told['digits']}e{told['power'] or 0}"
+    sign = "-" if stated["before"] not in ("", "+") else ""
+    return f"{sign}{stated['digits']}e{stated['power'] or 0}"
 
 
 def _is_number(cell: str, decimal: str) -> bool:
@@ -139,15 +139,15 @@ def _with(
     quoted: bool,
     is_told: Callable[[str, str], bool],
 ) -> tuple[float, Layout | None]:
-    """How much of the table is told with a separator and a decimal mark, and the layout of that."""
+    """How much of the table is read with a separator and a decimal mark, and the layout of that."""
     rows, ruled, width = table
     if (separator == decimal and not quoted) or width < 2:
         return -1.0, None
 
     def share(cells: Sequence[str]) -> float:
-        told = [cell for cell in cells if cell]
-        numbers = sum(is_told(cell, decimal) for cell in told)
-        return numbers / len(told) if told and len(cells) == width else math.nan
+        stated = [cell for cell in cells if cell]
+        numbers = sum(is_told(cell, decimal) for cell in stated)
+        return numbers / len(stated) if stated and len(cells) == width else math.nan
 
     shares = [share(cells) for _, cells in rows]
     # Numbers in a line or two before the names are not the table yet.
@@ -155,14 +155,14 @@ def _with(
     first = next(iter(begins), next((k for k, part in enumerate(shares) if part >= 0.5), 0))
     if not first or len(rows[first - 1][1]) < 2:
         return -1.0, None
-    told = [part for part in shares[first:] if math.isfinite(part)]
+    stated = [part for part in shares[first:] if math.isfinite(part)]
     below = first - 1  # the line below the names, if there is one
     while below and not _is_of_units(rows[below - 1][1], rows[below][1], width):
         below = below - 1 if len(set(rows[below][1])) < width else 0
     names = rows[below - 1 if below else first - 1][0]
     has_units = below > 0 or names + 1 in ruled
     layout = Layout(separator=separator, decimal=decimal, skip=names, units_line=has_units)
-    return sum(told) / len(rows) + 1e-3 * (decimal == "."), layout
+    return sum(stated) / len(rows) + 1e-3 * (decimal == "."), layout
 
 
 def _is_of_units(above: Sequence[str], below: Sequence[str], width: int) -> bool:

@@ -80,7 +80,7 @@ def _elsewhere(
     """Likeliest, shortest and longest time [s] that is missing, by how the ship goes elsewhere.
 
     A ship that winds goes less far than its speed says. A time is possible if windows of that length,
-    which begin and end about as fast (k,) [m/s] and turn as much, would be told as the jump between two
+    which begin and end about as fast (k,) [m/s] and turn as much, would be taken as the jump between two
     rows is, whose way needs a value [s] at its speed. None: there are too few of these.
     """
     rows, time, (a, b) = e.rows, e.time[e.rows], jump

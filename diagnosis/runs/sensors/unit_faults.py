@@ -170,10 +170,10 @@ def _judged(
     pose, said, size = pose[much], said[much], size[much]
     ratio = (pose * said).sum(axis=1) / size**2
     alike = _alike(pose, said)
-    told = " and ".join(names)
+    stated = " and ".join(names)
     if abs(alike) < AGREED:
         measured = {n: v for n, v in found.run.measured.items() if n not in names}
-        note = f"{told} and the pose disagree about the motion: {told} is not used"
+        note = f"{stated} and the pose disagree about the motion: {stated} is not used"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
     if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else

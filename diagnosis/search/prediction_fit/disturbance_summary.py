@@ -2,7 +2,7 @@
 
 Such a disturbance is a stretch in which the force that is left is beyond what chance gives anywhere
 in the runs, were it as large there as it usually is. Its beginning, end and size are those of the
-constant force that explains most of what is left around. It is told, and never a part of a model.
+constant force that explains most of what is left around. It is reported, and never a part of a model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,12 +53,12 @@ class Unrecorded:
     def sentence(self) -> str:
         """What is to be said of it."""
         size = zip(NAMES, self.disturbance.size, UNITS, self.disturbance.time, strict=True)
-        told = [
+        stated = [
             f"{number(x, 2)} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0
         ]
         text = "No disturbance is detected. "
-        if told:
-            text = f"A disturbance remains, with size and correlation time: {', '.join(told)}. "
+        if stated:
+            text = f"A disturbance remains, with size and correlation time: {', '.join(stated)}. "
             text += "Intervals and bands are wider by its uncertainty. "
         if self.differing:
             text += (
@@ -103,7 +103,7 @@ def _disturbances(
     """Disturbances of a run on an axis, each with how many standard deviations are left at its clearest.
 
     What lasts longer than a block is a remainder, and what is shorter than a third of a window of
-    the weak form cannot be told from a jump of the measured pose.
+    the weak form cannot be distinguished from a jump of the measured pose.
     """
     z = error / std
     rows = np.flatnonzero(np.abs(z) > limit)
