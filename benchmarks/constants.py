@@ -30,7 +30,7 @@ KINDS = ("module", "field", "default", "literal", "data")
 PACKAGE = Path(__file__).parents[1] / "diagnosis"
 # Rooms whose constants act on a verdict; the others show it, or judge a model by criteria of a user's.
 DECIDING = ("runs", "predictors", "search", "verdict", "assessment", "session.py")
-UNIT = r"(?:1/s|rad2?|m2?|s|Hz|kg|N2?|N m|K|deg|bytes|%|1)(?:/s2?)?(?!\w)"
+UNIT = r"(?:1/s|rad2?|m2?|s|Hz|kg|N2?|N m|K|deg(?:rees)?|bytes|%|1)(?:/(?:s2?|min))?(?!\w)"
 LEADING_UNIT = re.compile(rf"^{UNIT}(?:(?:,| and| or) {UNIT})*(?=[;,.: ]|$)|\[({UNIT}[^\]]*)\]")
 # An entry of a docstring, with its continuation lines.
 ENTRY = re.compile(r"^    (\w[\w, ]*): ((?:.*\n?)(?:^     +\S.*\n?)*)", re.MULTILINE)

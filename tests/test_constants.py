@@ -1,5 +1,7 @@
 """The count of numbers in a package: each kind is found where it is, and moving a number does not remove it."""
 
+import re
+
 import pytest
 from support.project import ROOT
 
@@ -146,3 +148,13 @@ def test_the_page_is_current(capsys):
     """``python -m benchmarks.constants --page > docs/constants.md`` brings it up to date."""
     command.main(["--page"])
     assert (ROOT / "docs" / "constants.md").read_text() == capsys.readouterr().out
+
+
+def test_each_constant_of_the_page_has_a_unit_and_a_reason():
+    rows = [
+        re.split(r"(?<!\\)\|", line)[1:-1]
+        for line in (ROOT / "docs" / "constants.md").read_text().splitlines()
+        if line.startswith("| `")
+    ]
+    assert {len(row) for row in rows} == {4}
+    assert [row[0] for row in rows if not all(cell.strip() for cell in row)] == []

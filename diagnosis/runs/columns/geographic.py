@@ -25,7 +25,7 @@ EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
-NOT_AVAILABLE = {"x": 91.0, "y": 181.0}  # degrees
+NOT_AVAILABLE = {"x": 91.0, "y": 181.0}  # degrees, where there is no position (ITU-R M.1371, AIS)
 TURNS = TURN, TURN / WHOLE, tau  # in degrees, 1e-7 degrees, rad
 # An angle as a text: 63.44° N, N63.44, 63°26.4'N, 63 26 24.0 N; 63.44°.
 ANGLE = re.compile(

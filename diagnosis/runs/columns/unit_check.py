@@ -76,8 +76,8 @@ FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 # m/s, times the scale of the ship: a Froude number of 0.12, where most ships manoeuvre (chosen); it only
 # orders units ten times apart.
 USUAL = 0.4
-TURN = 360.0  # degrees
-# Counts in a turn: tenths and hundredths of a degree, as of some compasses and of MAVLink, gon, mils,
+TURN = 360.0  # degrees, all the way round
+# 1, counts in a turn: tenths and hundredths of a degree, as of some compasses and of MAVLink, gon, mils,
 # parts of 16 bits, thousandths of a radian.
 COUNTS = (10.0 * TURN, 100.0 * TURN, 400.0, 6400.0, 65536.0, 2000.0 * math.pi)
 AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)

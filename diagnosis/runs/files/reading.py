@@ -59,7 +59,7 @@ from .tables import (
     resolution,
 )
 
-# Degrees, and a rate of turn in degrees per minute or coded, that are not available (ITU-R M.1371, AIS).
+# degrees, degrees/min, that are not available; the rate may be coded (ITU-R M.1371, AIS)
 NO_HEADING, NO_RATE = 511.0, -128.0
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs

@@ -37,8 +37,9 @@ READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
 WORDS = re.compile(r"\D*|[+-]?1\.#\w+|.*\0.*")  # of a cell without a value, as 1.#INF of C
-# A number with its direction before or behind it, and what these mean.
+# A number with its direction before or behind it.
 DIRECTED = re.compile(r"^(?P<before>[^\W\d_]+)?\s*(?P<size>\d+(?:\.\d+)?)\s*(?P<behind>[^\W\d_]+)?$")
+# 1, signs of the words of a direction.
 WAYS = {"port": -1.0, "p": -1.0, "astern": -1.0, "starboard": 1.0, "s": 1.0, "ahead": 1.0, "": 1.0}
 STILL = ("midship", "midships", "amidships", "stop")
 REMARK = re.compile(r"(#|%|//|\(|[^\W\d_]{2}).*")  # such as "Total rows: 1800"
