@@ -279,3 +279,58 @@ def test_source_for_programs_of_ones_own_runs_as_its_readme_says(tmp_path):
 def test_generated_code_names_the_place_of_no_file():
     text = "".join(ccode.model_source(program(COMPONENTS["vessel"])).values())
     assert str(ROOT) not in text
+
+
+WRONG = '''"""A component that is none: its step counts its calls, or gives no number."""
+
+from itertools import count
+from typing import Annotated, NamedTuple
+
+from fmus.declare import component
+
+CALLS = count()
+
+
+class Inputs(NamedTuple):
+    a: Annotated[float, "1", "input"] = 0.0
+
+
+class Params(NamedTuple):
+    k: Annotated[float, "1", "gain"] = 1.0
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, "1", "output"] = 0.0
+
+
+class State(NamedTuple):
+    x: Annotated[float, "1", "state"] = 0.0
+
+
+def init(i: Inputs, p: Params) -> State:
+    return State()
+
+
+def step(s: State, i: Inputs, p: Params, h: float) -> tuple[State, Outputs]:
+    return State(s.x + h), Outputs({y})
+
+
+COMPONENT = component(name="wrong", description="Wrong", init=init, step=step)
+'''
+
+
+@pytest.mark.parametrize("option", ["--out", "--source"])
+@pytest.mark.parametrize(
+    ("y", "why"),
+    [("s.x * float(next(CALLS))", "give another result"), ("None", "an output is None, and no number")],
+)
+def test_a_step_that_is_no_function_of_its_arguments_is_refused_where_it_is_compiled(
+    tmp_path, y, why, option
+):
+    file = tmp_path / "wrong.py"
+    file.write_text(WRONG.replace("{y}", y))
+    done = command(main, "--native", file, option, tmp_path / "made")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "wrong cannot be compiled: " in done.stderr
+    assert why in done.stderr
+    assert not (tmp_path / "made").exists()

@@ -91,6 +91,7 @@ def export(
     Returns:
         The files written.
     """
+    from ..fmi.trace import TraceError
     from ..native.export_source import exported_source
     from ..native.webassembly import exported_webassembly
 
@@ -99,7 +100,10 @@ def export(
     if starts is not None:
         found = [starts.baked(component) for component in found]
         _tell_unused(starts, [component.name for component in found], of, note)
-    files = exported_webassembly(found) if webassembly else exported_source(found)
+    try:
+        files = exported_webassembly(found) if webassembly else exported_source(found)
+    except TraceError as error:
+        raise BuildError(str(error)) from error
     with scratch_folder() as work:
         for name, text in files.items():
             (work / name).write_text(text, encoding="utf-8")
@@ -246,8 +250,10 @@ def _compiled(
 
     try:
         return native_fmu(component, code_hash, native.targets, work, python)
-    except (CompilerError, TraceError) as error:
+    except CompilerError as error:
         raise BuildError(f"{component.name} cannot be compiled: {error}") from error
+    except TraceError as error:
+        raise BuildError(str(error)) from error
 
 
 def _source_hash(

@@ -119,7 +119,9 @@ class Slave(Fmi2Slave):
             inputs, params = self._arguments()
             self._state = self.component.init(inputs, params)
             _, outputs = self.component.advance(self._state, inputs, self._prepared, 0.0)
-            self._values[self._slices[2]] = flatten(outputs)
+            flat = flatten(outputs)
+            sum(flat)  # refuses what is no number
+            self._values[self._slices[2]] = flat
             self._failure = ""
         except Exception as error:
             self._failure = f"initialisation failed: {error!r}"
@@ -146,11 +148,12 @@ class Slave(Fmi2Slave):
             inputs, _ = self._arguments()
             state, outputs = self.component.advance(self._state, inputs, self._prepared, step_size)
             flat = flatten(outputs)
+            total = sum(flat)
         except Exception as error:
             self.log(f"step at t = {current_time} s failed: {error!r}", Fmi2Status.error)
             return False
         # A finite sum has no other terms; a sum may also be too large though no term is.
-        if not isfinite(sum(flat)) and not all(map(isfinite, flat)):
+        if not isfinite(total) and not all(map(isfinite, flat)):
             bad = [n for n, x in zip(self._names[self._slices[2]], flat, strict=True) if not isfinite(x)]
             self.log(
                 f"step at t = {current_time} s failed: {', '.join(bad)} not finite", Fmi2Status.error

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..declare import Component
-from .model_source import model_source, sizes
+from .model_source import repeated_source, sizes
 from .program import Program, program
 
 README = Path(__file__).with_name("source_readme.md")
@@ -44,7 +44,7 @@ def exported_source(components: Iterable[Component]) -> dict[str, str]:
     recorded = [program(component) for component in components]
     files = {"README.md": _readme(recorded)}
     for each in recorded:
-        files |= model_source(each)
+        files |= repeated_source(each)
     return files
 
 

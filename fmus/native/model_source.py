@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 
 from ..declare import Variable, variables, width
+from ..fmi.trace import TraceError
 from .c_text import PREAMBLE, Writer, number
-from .program import Program
+from .program import Program, program
 
 FACE = "face.c"
 TABLES = "tables.h"
@@ -20,6 +21,22 @@ def model_source(recorded: Program) -> dict[str, str]:
     """
     name = recorded.component.name
     return {f"{name}.h": _header(recorded), f"{name}.c": _source(recorded)}
+
+
+def repeated_source(recorded: Program) -> dict[str, str]:
+    """The source of a component, where a second recording of it gives the same.
+
+    Raises:
+        TraceError: they differ, as its functions use a random number, a time or a count of their calls.
+    """
+    source = model_source(recorded)
+    if source != model_source(program(recorded.component)):
+        raise TraceError(
+            f"{recorded.component.name} cannot be compiled: its functions give another result "
+            "when they are called again; they may use their arguments alone, and no random number, "
+            "time or count"
+        )
+    return source
 
 
 def _heads(name: str) -> dict[str, str]:

@@ -16,7 +16,7 @@ from ..declare import Component
 from ..fmi.model_description import guid_of, model_description
 from ..fmi.repeatable_archive import write_archive
 from .compilers import TARGETS, compiled
-from .model_source import FACE, TABLES, model_source, tables
+from .model_source import FACE, TABLES, repeated_source, tables
 from .program import program
 
 FACE_FILE = Path(__file__).with_name(FACE)
@@ -47,7 +47,7 @@ def native_fmu(
     """
     recorded = program(component)
     guid = guid_of(code_hash)
-    source = {**model_source(recorded), TABLES: tables(recorded, guid)}
+    source = {**repeated_source(recorded), TABLES: tables(recorded, guid)}
     for name, text in source.items():
         (work / name).write_text(text, encoding="utf-8")
     version = importlib.metadata.version("cybership")

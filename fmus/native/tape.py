@@ -144,7 +144,7 @@ class Tape:
         return RecordedFunction(self.body, results)
 
     def operation(self, name: str, args: Sequence[Operand]) -> Operand:
-        """Fields an operation, but for one with a known truth value."""
+        """Record an operation, but for one with a known truth value."""
         self._check(args)
         if name in _DECIDED and any(isinstance(x, bool) for x in args):
             known, other = args if isinstance(args[0], bool) else args[::-1]
@@ -153,7 +153,7 @@ class Tape:
         return self._once(name, args, condition)
 
     def branch(self, condition: RecordedValue, a: Callable[[], T], b: Callable[[], T]) -> T:
-        """Fields a branch; gives what is there behind it, in the shape that both cases have."""
+        """Record a branch; the value behind it has the shape of both cases."""
         self._check([condition])
         first, one = self._inner(a)
         second, other = self._inner(b)
@@ -187,7 +187,7 @@ class Tape:
             self.block, self._done = outer, before
 
     def call(self, function: Callable[..., T], args: tuple[object, ...]) -> T:
-        """Fields a call of a kernel, which is recorded itself at its first call."""
+        """Record a call of a kernel, which is recorded itself at its first call."""
         flat = list(leaves(args))
         self._check(flat)
         key = function, shape(args)
