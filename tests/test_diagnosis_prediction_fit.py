@@ -462,6 +462,31 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     assert fit.disturbance.size[2] > 10.0 * fit.disturbance.size[:2].max()
 
 
+def test_a_factor_of_all_forces_and_masses_is_known_by_the_prior_alone():
+    """It changes no motion: however precise the measurement, its uncertainty is that of the prior.
+
+    The weighed mass stays, and added masses take its part: their prior is wide.
+    """
+    model = Model()
+    data, prior = [weak_windows(smoothed(sail(noise=1e-2)[0]))], NominalPrior.of(model)
+    at = RefinedModel.at(model, prior)
+    problem = PredictionFit(data, shootings(data, model), at, prior)
+    fit = fit_to(problem, at)
+    changes = {n: model.value(n) for n in problem.names} | dict.fromkeys(
+        ("m", "I_z", "plant_l_vsp", "plant_l_bow"), 0.0
+    )
+    for of, mass in {"X_udot": "m", "Y_vdot": "m", "N_rdot": "I_z"}.items():
+        changes[of] = model.value(of) - model.value(mass)
+    factor = np.array([changes[n] for n in problem.names]) / problem.unit
+    by_prior = 1.0 / (factor @ problem.precision @ factor)
+    weight = factor @ problem.precision * by_prior / problem.unit
+    assert by_prior**0.5 > 0.03
+    assert weight @ fit.covariance @ weight == pytest.approx(by_prior, rel=0.02)
+    known = problem.information(fit.estimate)
+    alone = known.power(problem.precision) * np.diag(known.H) * factor**2
+    assert alone.max() > 1e6 / by_prior, "with all others known, one coefficient is known far better"
+
+
 def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):
     fit, prior = fitted()
     posterior = JointPosterior.of(fit, prior)

@@ -48,9 +48,9 @@ def beyond(places: int) -> float:
 def ridge(H: np.ndarray, unit: np.ndarray | float = 1.0) -> np.ndarray:
     """(p, p), what makes an information matrix regular, for parameters with units (p,).
 
-    It is far above the rounding of a sum, so that collinear parameters share.
+    It is far above the rounding of a sum, so that collinear parameters share, and far below a prior.
     """
-    return DIGITS * np.diag(np.diag(H) + np.power(unit, -2.0))
+    return DIGITS**1.5 * np.diag(np.diag(H) + np.power(unit, -2.0))
 
 
 def most_likely(

@@ -44,6 +44,10 @@ from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # 1, of the windows in which predictions are shown
+# 1, of a prior deviation, a value or its unit: step of a slope of predictions, whose relative error is as
+# large. A factor of all forces and masses changes no prediction; with errors of 1e-3 precise data would
+# determine it.
+STEP = SMALL**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +152,10 @@ class PredictionFit:
         units = [at.start.unit(n) for n in names]
         self._own = np.array([*units, *[1.0] * len(believed)])
         self.unit = np.array([*units, *believed])[self._kept]
-        scale = {n: max(abs(at.values[n]), SMALL * u) for n, u in zip(names, units, strict=True)}
+        scale = {n: max(abs(at.values[n]), u) for n, u in zip(names, units, strict=True)}
         scale |= {n: s for n, s in prior.std.items() if s}
         self.names = [n for n, kept in zip([*names, *prior.std], self._kept, strict=True) if kept]
-        self._steps = {n: SMALL * s for n, s in scale.items()}
+        self._steps = {n: STEP * s for n, s in scale.items()}
         # Of an effect that adds to a nominal coefficient, such as a lag, the name stands twice.
         self._columns = [[*self._steps].index(n) for n in self.names]
         P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
