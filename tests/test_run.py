@@ -146,6 +146,25 @@ def test_folder_holds_nothing_of_an_earlier_run(scenario, tmp_path):
     }  # fmt: skip
 
 
+def test_a_folder_is_one_run_s_as_long_as_that_runs(scenario, tmp_path):
+    out, second = tmp_path / "out", []
+
+    def meanwhile(seconds):
+        if not second:
+            second.append(command(scenario(stop=0.5), "--out", out))
+
+    first = cosim.simulate(cosim.load_scenario(scenario()), out, progress=meanwhile)
+    (done,) = second
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"another run writes to '{out}'" in done.stderr
+    assert first.status == "done"
+    assert len((out / "log.csv").read_text().splitlines()) == first.rows + 1
+    assert not [p.name for p in out.iterdir() if p.name.startswith(".")]
+    again = command(scenario(stop=0.5), "--out", out)
+    assert again.returncode == 0
+    assert "replaces the earlier run" in again.stdout + again.stderr
+
+
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [

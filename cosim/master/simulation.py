@@ -4,6 +4,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from ..errors import InputError, SimulationError, not_written
 from ..files import update_json, write_json, write_roomy_json
 from ..process.run_state import LOGGING, STATE, Owner
 from ..results import log as logs
-from ..results.result_files import clear_results, default_folder, others_file
+from ..results.result_files import default_folder, others_file
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..scenario.shipped import find_parameters
@@ -28,6 +29,7 @@ from .loop_surroundings import interruptible, quiet_collector
 from .loops.chosen_loop import choose_loop, run_loop
 from .real_time import RealTimePace
 from .recorder import Recorder, demand_memory
+from .result_folder import ResultFolder
 from .run_record import describe
 
 
@@ -83,6 +85,8 @@ def simulate(
     owner = Owner()
     sweep()
     result: Result | None = None
+    at_end = ExitStack()
+    at_end.callback(STATE.finish)
     try:
         models = None if pool is None else pool.models(scenario)
         system = prepare(scenario, overrides, only_own, models, controllers)
@@ -100,8 +104,10 @@ def simulate(
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
                 moved = f"note: another run is in '{first}'; this one is written to '{given}'"
+            results = ResultFolder(folder, moved)
+            at_end.callback(results.leave)
             result, recorder = _run(
-                system, folder, moved, description, realtime, show, progress, pool, pictures
+                system, results, description, realtime, show, progress, pool, pictures
             )
         finally:
             owner.leave_copies()
@@ -115,15 +121,14 @@ def simulate(
             interrupted_late(result)
         raise
     finally:
-        STATE.finish()
+        at_end.close()
     result.folder = given
     return result
 
 
 def _run(
     system: System,
-    folder: Path,
-    moved: str,
+    results: ResultFolder,
     description: dict[str, Any],
     realtime: float | None,
     show: Callable[[str], None],
@@ -133,9 +138,9 @@ def _run(
 ) -> tuple[Result, Recorder | None]:
     """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log.
 
-    ``moved`` is shown as soon as nothing can refuse the run any more.
+    The folder of the results is made as soon as nothing can refuse the run any more.
     """
-    scenario, owner = system.scenario, Owner()
+    scenario, owner, folder = system.scenario, Owner(), results.path
     for note in scenario.notes:
         show(f"note: {note}")
     for warning in system.warnings:
@@ -154,13 +159,13 @@ def _run(
                 raise KeyboardInterrupt from None
             if isinstance(error, InputError):
                 raise
-            _clear(folder, moved, show)
+            results.make(show)
             stated = {"status": "failed", "rows": 0, "message": str(error)}
             write_json(folder / logs.SIDECAR, {**description, **stated})
             return Result("failed", folder, message=str(error), warnings=system.warnings), None
         try:
             owner.leave_copies()
-            _clear(folder, moved, show)
+            results.make(show)
             result, recorder = _record(
                 system, master, folder, realtime, progress, description, interrupted, pictures
             )
@@ -169,18 +174,6 @@ def _run(
         if interrupted():  # while an FMU terminated
             interrupted_late(result)
         return result, recorder
-
-
-def _clear(folder: Path, moved: str, show: Callable[[str], None]) -> None:
-    """Make the result folder, without what an earlier run left there, and say if it is another one."""
-    try:
-        if (folder / logs.SIDECAR).exists():
-            show(f"note: replaces the earlier run in '{folder}'")
-        clear_results(folder)
-    except OSError as error:
-        raise InputError(not_written(folder, error)) from None
-    if moved:
-        show(moved)
 
 
 def _record(

@@ -44,9 +44,9 @@ from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # 1, of the windows in which predictions are shown
-# 1, of a prior deviation, a value or its unit: step of a slope of predictions, whose relative error is as
-# large. A factor of all forces and masses changes no prediction; with errors of 1e-3 precise data would
-# determine it.
+# 1, of a prior deviation, a value or its unit: step of a slope of predictions, whose relative error is
+# as large. A factor of all forces and masses changes no prediction; with errors of 1e-3 precise data
+# would determine it.
 STEP = SMALL**2
 
 
