@@ -294,6 +294,16 @@ def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
             "0 outputs, 3 are",
         ),
         (OWN.format(gain=1.0).replace('Annotated[float, "N/m", "gain"]', "float"), "needs a unit"),
+        (
+            OWN.format(gain=1.0).replace("Force(p.k * e", "Force(None"),
+            "an output is None, and no number",
+        ),
+        (
+            OWN.format(gain=1.0).replace(
+                "    return s, Force", "    import fmus.ops\n    return s, Force"
+            ),
+            "line 2[0-9]: fmus is imported at the top",
+        ),
     ],
 )
 def test_a_users_file_that_is_no_component_is_refused(tmp_path, text, message):

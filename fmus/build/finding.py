@@ -1,9 +1,11 @@
 """Which component a name on the command line means: one of ours, or that of a user's file."""
 
+import ast
 import importlib.util
 import keyword
 import math
 import traceback
+from itertools import chain
 from pathlib import Path
 
 from cybership.message_text import PrintableError, failure
@@ -11,7 +13,7 @@ from cybership.message_text import PrintableError, failure
 from ..base_units import base_exponents
 from ..declare import Component, DeclarationError, nearest, variables, width
 from ..effects import EffectSet
-from ..fmi.trace import trace_init, trace_step
+from ..fmi.trace import Symbol, trace_init, trace_step
 from ..ship import Ship, ship
 from ..ships.naming import DEFAULT
 
@@ -61,6 +63,8 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
     component = getattr(module, "COMPONENT", None)
     if not isinstance(component, Component):
         raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
+    if (line := _late_import(own_file)) is not None:
+        raise BuildError(f"'{own_file}', line {line}: fmus is imported at the top of the file only")
     try:
         _check(component)
         _check_ranges(component)
@@ -78,10 +82,25 @@ def _check(component: Component) -> None:
         if not math.isfinite(v.start):
             raise DeclarationError(f"{v.name} starts at {v.start}")
     for trace in (trace_init(component), trace_step(component)):
+        given = (*trace.state, *trace.outputs)
+        if wrong := [x for x in given if not isinstance(x, Symbol | float | int)]:
+            raise DeclarationError(f"a state or an output is {wrong[0]!r}, and no number")
         if len(trace.outputs) != width(component.outputs):
             raise DeclarationError(
                 f"step gives {len(trace.outputs)} outputs, {width(component.outputs)} are declared"
             )
+
+
+def _late_import(own_file: Path) -> int | None:
+    """Line of an import of fmus in a function, which an FMU cannot do; None: there is none."""
+    tree = ast.parse(own_file.read_bytes())
+    functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    for node in chain.from_iterable(map(ast.walk, functions)):
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        if any(name.partition(".")[0] == "fmus" for name in names):
+            return getattr(node, "lineno", None)
+    return None
 
 
 def _check_ranges(component: Component) -> None:
