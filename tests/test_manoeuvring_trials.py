@@ -228,6 +228,24 @@ def test_the_loop_of_a_spiral_is_that_of_the_unstable_rates():
     assert measure("spiral", unstable, 1.0)["loop_height"] == pytest.approx(height, rel=0.01)
 
 
+def test_a_spiral_that_turns_to_one_side_alone_has_rates_of_one_sign_and_no_loop():
+    """r of 0.1 order = 40 r^3 - 2 r, which has a root above sqrt(1 / 60) at each order."""
+
+    def root(order):
+        return max(np.roots([40.0, 0.0, -2.0, -0.1 * order]).real)
+
+    p = nomoto(
+        "spiral", 1400.0, 1.0, h=0.05, rate=lambda r: 40.0 * r**3 - 2.0 * r, plateaus=4.0, hold=80.0
+    )
+    found = measure("spiral", p, 1.0)
+    rates = [found["rate_port"], found["rate_starboard"]]
+    assert np.abs(rates) == pytest.approx(
+        sorted([root(-1.0), root(1.0)], reverse=rates[0] < 0.0), rel=1e-3
+    )
+    assert rates[0] * rates[1] > 0.0
+    assert "loop_height" not in found
+
+
 @given(st.floats(0.2, 5.0), st.floats(0.01, 0.5), st.floats(-3.0, 3.0))
 def test_a_constant_deceleration_stops_by_its_closed_form(U, a, psi):
     time = np.arange(0.0, 10.0 + 1.5 * U / a, 0.01)

@@ -1,5 +1,6 @@
 """Measures of a direct spiral."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -43,14 +44,21 @@ def spiral_measures(p: Passage, length: float) -> dict[str, float]:
 
     Returns:
         Of :data:`~cosim.trials.measures.MEASURES` the rates at the full order to either side, and the
-        height of the loop: the difference of the rates at no order, coming from either side.
+        height of the loop: the difference of the rates at no order, coming from either side. A ship that
+        the full order does not turn to the other side has rates of one sign, and no such height.
     """
     held = plateaus(p)
-    rates = [rate for _, rate in held]
-    found = {"rate_starboard": max(rates, default=0.0), "rate_port": min(rates, default=0.0)}
-    largest = max((abs(order) for order, _ in held), default=0.0)
+    if not held:
+        return {}
+    largest = max(abs(order) for order, _ in held)
+
+    def rates(at: float, among: Sequence[Plateau]) -> list[float]:
+        return [rate for order, rate in among if abs(order - at) <= SAME * largest]
+
+    ends = [float(np.mean(rates(end(held).order, held))) for end in (min, max)]
+    found = {"rate_starboard": max(ends), "rate_port": min(ends)}
     # Not those of the approach and of the end: of those that lie between two others.
-    middle = [rate for order, rate in held[1:-1] if abs(order) <= SAME * largest]
-    if len(middle) > 1:
+    middle = rates(0.0, held[1:-1])
+    if len(middle) > 1 and ends[0] * ends[1] < 0.0:
         found["loop_height"] = max(middle) - min(middle)
     return found
