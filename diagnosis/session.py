@@ -188,7 +188,12 @@ def _source(model: Model | ModelSource | str | Path | None, runs: Sequence[WeakW
     """The model of some runs as a source of predictions; the nominal one by default."""
     if isinstance(model, (str, Path)):
         return open_model(model)
-    return DescribedShip(model or nominal(runs)) if model is None or isinstance(model, Model) else model
+    if model is None or isinstance(model, Model):
+        return DescribedShip(model or nominal(runs))
+    if not hasattr(model, "on"):
+        kind = type(model).__name__
+        raise InputError(f"a model is a Model, an Fmu, a PythonFunction or a path, not of type {kind}")
+    return model
 
 
 def _compared(

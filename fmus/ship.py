@@ -12,7 +12,7 @@ from .actuators.actuation import command_units
 from .actuators.law import Law
 from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
-from .declare import Component, Known, Variable, discover, variables
+from .declare import Component, DeclarationError, Known, Variable, discover, variables
 from .effects import STANDARD, EffectSet
 from .hull import mass_matrix
 from .hull_functions import FUNCTIONS
@@ -210,7 +210,11 @@ def _ship(effects: EffectSet, description: Description) -> Ship:
     own = effects_of_ship(description, effects)
     parts = make_vessel(own, description), make_thrusters(own, description)
     for part in parts:
-        _ = part.variables  # refuses names that are there twice
+        try:
+            _ = part.variables  # refuses names that are there twice
+        except DeclarationError as error:
+            where = " or ".join(f"'{file}'" for file in effects.files)
+            raise DeclarationError(f"{where}: {error}" if where else str(error)) from error
     return Ship(own, *parts, description)
 
 

@@ -130,7 +130,7 @@ def test_bands_are_as_wide_as_predictions_of_runs_left_out_are_off():
         assert as_missed(problem, other, model, posterior).size == pytest.approx(found.size, rel=1e-6)
     squares = []
     for w, left_out in zip(runs(), fitted.fold_models, strict=True):
-        windows = Windows([w.smoothed])
+        windows = Windows([w])
         bands = prediction_bands(w.smoothed, windows, model, posterior, found)
         V = np.einsum("nii->ni", bands.at_samples)
         squares.append(windows.residuals(left_out) ** 2 / V)

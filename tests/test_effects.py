@@ -445,6 +445,14 @@ def test_one_function_in_one_file_adds_an_effect_to_the_fmu(tmp_path):
         (OWN.format(body=GOOD).replace('"N_uuv"', '"X_u"'), "'X_u' already"),
         (OWN.format(body=GOOD).replace('"force"', '"farce"'), "no kind 'farce'"),
         (OWN.format(body=GOOD).replace('    """A moment of my own."""\n', ""), "docstring"),
+        (
+            OWN.format(body=GOOD).replace("formula=", "memory=((0.0, 0.0),), formula="),
+            "'mine.py': N_uuv: a memory is of an actuator, and the kind is 'force'",
+        ),
+        (
+            OWN.format(body="X_u * ship.u").replace("N_uuv:", "X_u:"),
+            "'mine.py': vessel declares X_u more than once",
+        ),
         ("x = 1", "registers no effect"),
         ("class Other:\n    pass", "registers no effect"),
         ("import nowhere_at_all", "nowhere_at_all"),

@@ -117,6 +117,7 @@ def test_the_command_takes_a_file_and_says_how_it_predicts(tmp_path, file):
     ("content", "message"),
     [
         ("def other(): pass", "has no function acceleration"),
+        ("def acceleration(state): pass", "has no function acceleration"),
         ("1 / 0", "fails when imported"),
         ("def acceleration(state, commands):\n    return 0.0, 0.0", "must return u_dot, v_dot, r_dot"),
         ("def acceleration(state, commands):\n    return commands['rudder'], 0, 0", "fails: KeyError"),

@@ -52,7 +52,9 @@ def test_information_criterion_charges_the_logarithm_of_the_number_of_blocks_for
 
 def test_mistakes_are_one_line(tmp_path):
     (tmp_path / "none.py").write_text("x = 1")
+    (tmp_path / "two.py").write_text("def harm(its, others):\n    return ''")
     for name, line in (
+        (str(tmp_path / "two.py"), r"has no function harm\(its, others, more\)"),
         ("pared", "did you mean 'paired'"),
         (str(tmp_path / "none.py"), "has no function harm"),
         (str(tmp_path / "missing.py"), "no such Python file of a criterion of pruning"),

@@ -75,7 +75,7 @@ def measure(trial: str, p: Passage, length: float) -> dict[str, float]:
         InputError: no such trial, or the order under trial never changes.
     """
     if trial not in KINDS:
-        raise InputError(f"no trial '{trial}'{nearest(trial, KINDS)}; there are {', '.join(KINDS)}")
+        raise InputError(f"no trial '{trial}'{nearest(trial, KINDS)}")
     found = KINDS[trial](p, length)
     return {metric.name: found[metric.name] for metric in MEASURES if metric.name in found}
 

@@ -1,7 +1,9 @@
 """Python files of a user that extend the diagnosis by a method or a criterion."""
 
+import inspect
 import runpy
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,9 +24,19 @@ def chosen(
     if name.endswith(".py"):
         return from_file(Path(name), own, f"a {what}")
     if name not in known:
-        raise InputError(f"no {what} '{name}'{nearest(name, known)}; there are {', '.join(known)}")
+        raise InputError(f"no {what} '{name}'{nearest(name, known)}")
     module, found = known[name]
     return getattr(import_module(f".{module}", package), found)
+
+
+def takes(function: object, arguments: int) -> bool:
+    """Whether something is a function of so many arguments; one that does not state them may be."""
+    with suppress(ValueError):  # it does not
+        try:
+            inspect.signature(function).bind(*range(arguments))  # pyright: ignore[reportArgumentType]
+        except TypeError:
+            return False
+    return callable(function)
 
 
 def from_file(path: Path, name: str, what: str) -> object:

@@ -25,7 +25,7 @@ from fmus.ship import Ship
 from fmus.vessel import vessel
 
 from ..execution.progress import Advance, silent
-from ..execution.user_files import from_file
+from ..execution.user_files import from_file, takes
 from ..runs import Smoothed
 from .black_box import MOTION, TAU, BlackBox, Signals, commands_at
 from .described_ship import nominal
@@ -121,6 +121,6 @@ def open_function(path: Path, ship: Ship | None) -> PythonFunction:
         InputError: no such file or function, or the file fails.
     """
     function = from_file(path, NAME, "a model")
-    if not callable(function):
+    if not takes(function, 2):
         raise InputError(f"'{path}' has no function {NAME}(state, commands)")
     return PythonFunction(cast(Acceleration, function), ship, path)

@@ -22,7 +22,7 @@ from .prediction import WindowStarts, at_constant_velocities, by_measurement, pr
 from .ship_model import Model
 from .thrust import LONGEST_STEP
 from .uncertainty import NOISE_TOLERANCE
-from .weak_form import BLOCK, BLOCKS, HORIZON
+from .weak_form import BLOCK, BLOCKS, HORIZON, WeakWindows
 
 # Of a run that is predicted as a whole, times the scale of the ship.
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
@@ -68,12 +68,12 @@ class Windows:
     """The windows of some runs, in which models are compared with the measurement.
 
     Args:
-        runs: smoothed runs of one ship.
+        runs: of one ship, from :func:`diagnosis.load` or :func:`diagnosis.smooth`.
         length: of the windows [s]; by default that of the ship.
         spans: for each run first and last time [s] at which a window may begin; by default any.
 
     Attributes:
-        runs: the runs.
+        runs: the smoothed runs.
         length: of the windows [s].
         run, start: (w,), number of each window's run, and when it starts [s].
         sample_window: (samples,), the window of each sample that is used.
@@ -86,10 +86,11 @@ class Windows:
 
     def __init__(
         self,
-        runs: Sequence[Smoothed],
+        runs: Sequence[Smoothed | WeakWindows],
         length: float | None = None,
         spans: Sequence[tuple[float, float]] | None = None,
     ) -> None:
+        runs = [r.smoothed if isinstance(r, WeakWindows) else r for r in runs]
         self.runs = tuple(runs)
         self.length = length or HORIZON * runs[0].scale.time
         spans = spans or [ANY_TIME] * len(runs)

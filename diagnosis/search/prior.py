@@ -49,6 +49,8 @@ def _given(ship: Ship, prior: Prior) -> dict[str, float]:
         if name not in names:
             raise InputError(f"no coefficient or group '{name}' for the prior{nearest(name, names)}")
     for share in given.values() if prior is None or isinstance(prior, Mapping) else (prior,):
+        if not isinstance(share, float | int):
+            raise InputError(f"the prior must be a number, or numbers by name, not {share!r}")
         if not 0.0 <= share < inf:
             raise InputError(f"the prior must be zero or more, not {share:g}")
     if isinstance(prior, float | int):

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from cosim import InputError
 
-from ..execution.user_files import chosen
+from ..execution.user_files import chosen, takes
 
 if TYPE_CHECKING:
     from ..search.significance import Losses
@@ -47,6 +47,6 @@ def criterion(name: str = PAIRED) -> Harm:
         InputError: there is none of this name, or the file fails.
     """
     found = chosen(name, CRITERIA, PACKAGE, "criterion of pruning", "harm")
-    if not callable(found):
+    if not takes(found, 3):
         raise InputError(f"'{name}' has no function harm(its, others, more)")
     return cast(Harm, found)

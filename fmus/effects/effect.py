@@ -371,6 +371,8 @@ def effect(
         lines = (more.get("description") or docstring(function)).strip().splitlines()
         if not lines:
             raise DeclarationError(f"{id}: the first line of the docstring describes the effect")
+        if more.get("memory") is not None and kind != "actuator":
+            raise DeclarationError(f"{id}: a memory is of an actuator, and the kind is '{kind}'")
         leading = 3 if more.get("memory") is not None else 2 if kind == "actuator" else 1
         parameters = more.get("parameters") or parameters_of(id, leading, function)
         how = frozenset(settings)

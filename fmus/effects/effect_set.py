@@ -154,6 +154,9 @@ def _imported(name: str, path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
+    except DeclarationError as error:
+        del sys.modules[name]
+        raise DeclarationError(f"'{path}': {error}") from error
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         what = f"{error.msg}, line {error.lineno}" if isinstance(error, SyntaxError) else repr(error)
