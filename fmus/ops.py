@@ -183,6 +183,12 @@ def signed_root(x: Number) -> Number:
     return where(x < 0.0, -size, size)
 
 
+def tanh(x: Number) -> Number:
+    """Hyperbolic tangent, to a few times the rounding of 1."""
+    e = exp(-2.0 * abs(x))
+    return sign(x) * (1.0 - e) / (1.0 + e)
+
+
 def power(x: Number, exponent: Number) -> Number:
     """x^exponent of x >= 0 and an exponent > 0 that need be no whole number."""
     return exp(exponent * log(fmax(x, TINY)))

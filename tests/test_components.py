@@ -8,6 +8,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from support.cases import slow
 from support.project import COMPONENTS
 from support.ships import PARTS
@@ -243,3 +245,9 @@ def test_functions_give_outside_their_domain_what_arrays_give(name, x):
     with np.errstate(all="ignore"):
         expected = getattr(ops, name)(np.array([x]))[0]
     assert getattr(ops, name)(x) == pytest.approx(expected, nan_ok=True)
+
+
+@given(st.floats(allow_nan=False))
+def test_the_hyperbolic_tangent_is_that_of_the_library(x):
+    assert ops.tanh(x) == pytest.approx(math.tanh(x), rel=1e-15, abs=3e-16)
+    assert ops.tanh(np.array([x])).item() == ops.tanh(x)
