@@ -461,3 +461,12 @@ def test_shipped_ships_are_built(name: str, tmp_path: Path) -> None:
     done = command(main, *parts, "--ship", path, "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert {p.stem for p in tmp_path.iterdir()} == set(parts)
+
+
+def test_each_actuator_that_gives_more_than_the_weight_has_a_warning(tmp_path: Path) -> None:
+    strong = RIGHT.replace("n_max = 10.0", "n_max = 600.0")
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        read_ship(written(tmp_path, strong))
+    named = [str(w.message).partition("actuator ")[2].partition(" gives")[0] for w in found]
+    assert named == ["'port'", "'starboard'"]

@@ -112,12 +112,12 @@ def _sizes(ship: Description) -> Iterator[ShipDoubt]:
         yield ShipDoubt("inertia", 0, "I_z", text)
     if ship.actuators and not (ship.terms or ship.functions):
         yield ShipDoubt("hull", 0, "", "the hull has no damping: what moves never stops")
-    reached = [(max(map(abs, _reach(part)), default=0.0), k) for k, part in enumerate(ship.actuators)]
-    thrust, k = max(reached, default=(0.0, 0))
-    if thrust > m * G:
-        part = ship.actuators[k]
-        text = f"actuator '{part.name}' gives {thrust:.3g} N, more than the ship's weight, {m * G:.3g} N"
-        yield ShipDoubt("actuators", k, "n_max" if part.stated("n_max") else "", text)
+    weight = m * G
+    for k, part in enumerate(ship.actuators):
+        if (thrust := max(map(abs, _reach(part)), default=0.0)) > weight:
+            more = f"gives {thrust:.3g} N, more than the ship's weight, {weight:.3g} N"
+            key = "n_max" if part.stated("n_max") else ""
+            yield ShipDoubt("actuators", k, key, f"actuator '{part.name}' {more}")
 
 
 def _reach(part: Part) -> Iterator[float]:
