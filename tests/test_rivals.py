@@ -13,6 +13,7 @@ from diagnosis.runs import read_frame
 from diagnosis.search.candidates import model_error
 from diagnosis.search.rivals import (
     LinearProblem,
+    held_forces,
     may_be_modulated,
     modulated_forces,
     probability_beside,
@@ -130,6 +131,42 @@ def test_the_command_of_a_twin_is_an_actuator_s_own(otter, noise):
     found = [name for name, _ in modulated_forces([twins], model)]
     assert len(found) == 4
     assert all(name.endswith(("|v|", "|r|")) for name in found)
+
+
+def test_a_held_force_is_that_of_a_constant_command_in_the_intervals_of_an_outage(otter):
+    model, _, (w,) = otter
+    times = {"port_outage_start_1": 20.0, "port_outage_end_1": 40.0}
+    (force,) = held_forces([w], model.plus(times), model.ship.effects["port_outage"])
+    before, inside = w.middle < 18.0, (w.middle > 28.0) & (w.middle < 38.0)  # lags of 1 s are over
+    assert np.abs(force[before]).max() == 0.0
+    n = float(np.sqrt(np.mean(w.run.commands[:, 0] ** 2)))
+    (port,) = [a for a in model.ship.description.actuators if a.name == "port"]
+    thrust = port.number("k_ahead") * n * n
+    expected = thrust * np.array([1.0, 0.0, -port.number("y")])
+    assert force[inside] == pytest.approx(np.tile(expected, (inside.sum(), 1)), rel=1e-3, abs=1e-9)
+    for run in (replace(w.run, commands=None), replace(w.run, signals=("a", "b"))):
+        assert (
+            held_forces([w, w.commanded_as(run)], model.plus(times), model.ship.effects["port_outage"])
+            == []
+        )
+
+
+@pytest.mark.parametrize("held", [0.0, 0.3])
+def test_an_outage_is_likelier_than_a_held_command_only_where_that_is_near_zero(held):
+    rng = np.random.default_rng(4)
+    force = np.zeros((200, 1))
+    force[50:100] = 10.0  # of the usual command, in units of the noise
+    y = held * force[:, 0] + rng.standard_normal(200)
+    p = LinearProblem(y, np.zeros((200, 0)), rng.standard_normal((200, 2)), np.zeros(2), np.log(200.0))
+    wider = np.ones(2)
+    other = p.also_uncertain(force).log_evidence(np.ones(3), 0)
+    density = [
+        multivariate_normal.logpdf(y, None, np.eye(200) + p.coefficients @ p.coefficients.T + V)
+        for V in (0.0, force @ force.T)
+    ]
+    assert other - p.log_evidence(wider, 0) == pytest.approx(density[1] - density[0], rel=1e-6)
+    outage = probability_beside([p.log_evidence(wider, 0)], {0: [other]})
+    assert outage < 0.01 if held else outage > 0.95
 
 
 def test_without_commands_of_actuators_there_is_no_modulated_force(otter):

@@ -25,11 +25,11 @@ from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
 from .ending import Result, finish, interrupted_late, writing
+from .folder_of_run import ResultFolder
 from .loop_surroundings import interruptible, quiet_collector
 from .loops.chosen_loop import choose_loop, run_loop
 from .real_time import RealTimePace
 from .recorder import Recorder, demand_memory
-from .result_folder import ResultFolder
 from .run_record import describe
 
 

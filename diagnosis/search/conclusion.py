@@ -18,7 +18,14 @@ from .map_regression import regression
 from .most_likely import beyond, ridge
 from .prior import NominalPrior
 from .refinement import RefinedModel, TrainingSet, bounded, nuisance_of, refit, weighted_rows
-from .rivals import LinearProblem, may_be_modulated, modulated_forces, probability_beside
+from .rivals import (
+    HELD,
+    LinearProblem,
+    held_forces,
+    may_be_modulated,
+    modulated_forces,
+    probability_beside,
+)
 from .shortlist import scored_alone
 
 
@@ -91,7 +98,7 @@ class Selection:
             alike = credible(p.id, p.weights)
             own_share, set_share = self._beside_coefficients(p, 1, 1 + len(alike))
             of_set = p.weights[p.id] + sum(p.weights[i] for i in alike)
-            listed, modulation = self._beside_modulations(p)
+            listed, modulation = min(self._beside_modulations(p), self._beside_held_commands(p))
             seen = self._evidence(p, p.weights[p.id] * own_share)._replace(listed=listed)
             together = seen._replace(bagged=of_set * set_share)
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
@@ -184,6 +191,18 @@ class Selection:
         likeliest = [*forces][int(np.argmax(np.max(found, axis=0)))]
         listed = probability_beside(self._with_all, {0: np.ravel(found).tolist()})
         return listed, likeliest
+
+    def _beside_held_commands(self, p: AcceptedEffect) -> tuple[float, str]:
+        """Probability of an outage beside held commands in its intervals, and what these are called."""
+        t, outage = self.t, self.model.ship.effects[p.id]
+        forces = held_forces(t.data, self.model, outage) if outage.search.intervals else []
+        if not forces:
+            return 1.0, ""
+        problem, charged = self._linear(())
+        rival = problem.also_uncertain(weighted_rows(np.stack(forces, axis=2), t.weight))
+        ones = np.ones(len(forces))
+        found = [rival.log_evidence(np.append(wider, ones), charged) for wider in self._widths]
+        return probability_beside(self._with_all, {0: found}), HELD
 
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
         """Probability of sets of so many ids, with an effect, beside coefficients as stated."""

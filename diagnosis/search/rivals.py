@@ -19,6 +19,10 @@ other: of a bow thruster whose generator serves the propeller, too, less is left
 And a rudder behind a shaft that slows down in turns is another drag of yaw. There are as many such
 forces as pairs of actuators and channels. So the evidence of an effect that is a force is compared with
 the mean evidence of them all, each alone in its place.
+
+**Held commands.** An actuator that sticks gives another force than is ordered, at times, as one does
+that fails at times. An outage, without force in its intervals, is compared with a constant command in
+each of them, which is as large as the usual ones of the run (standard deviation of its prior).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,6 +32,7 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from fmus.actuators.actuation import actuators
+from fmus.actuators.actuator import Actuator
 from fmus.effects import Effect
 
 from ..predictors import Model, WeakWindows
@@ -37,6 +42,8 @@ from .candidates import model_error
 from .most_likely import ridge
 
 LOSS = "loss_"  # beginning of the id of an actuator's loss, a constant share of its force
+OUTAGE = "_outage"  # end of the id of one that fails at times
+HELD = "the actuator held at a constant command"
 
 
 class LinearProblem(NamedTuple):
@@ -66,6 +73,13 @@ class LinearProblem(NamedTuple):
         y, effects, coefficients, each = np.split(R, np.cumsum([p.shape[1] for p in parts])[:-1], axis=1)
         known = self._replace(y=y[:, 0], coefficients=coefficients)
         return [known._replace(effects=np.column_stack([effects, column])) for column in each.T]
+
+    def also_uncertain(self, columns: np.ndarray) -> "LinearProblem":
+        """The same with further coefficients, of which columns (n, m) are one standard deviation."""
+        coefficients = np.concatenate([self.coefficients, columns], axis=1)
+        return self._replace(
+            coefficients=coefficients, offset=np.append(self.offset, np.zeros(columns.shape[1]))
+        )
 
     def log_evidence(self, wider: np.ndarray, charged: int) -> float:
         """Logarithm of the evidence, but for a constant that all models of one noise share.
@@ -127,8 +141,7 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
         effect = ship.effects.get(f"{LOSS}{a.part.name}")
         if effect is None:
             continue
-        count = len(a.law.commands)
-        own = range(a.own, a.own + count * len(a.sides)) if apart else range(a.first, a.first + count)
+        own = _columns(a, apart)
         lost = base - model_error(data, model.plus({effect.parameters[0].name: 1.0}))
         if not lost.any():
             continue
@@ -141,6 +154,55 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
         for name, size in named.items():
             if size.any() and not any(_alike(size, x) for x in its):
                 yield f"the force of the {a.part.title} in proportion to {name}", lost * size[:, None]
+
+
+def held_forces(data: Sequence[WeakWindows], model: Model, outage: Effect) -> list[np.ndarray]:
+    """Forces of an actuator that is held in the intervals of an outage, (K, 3) of each interval.
+
+    Its first command is held at what it is in the root mean square of the run, the others at their
+    medians in the interval.
+
+    Args:
+        data: windows of every run.
+        model: with the outage.
+        outage: of an actuator, with intervals.
+
+    Returns:
+        None where the outage is of no single actuator, or the commands of runs are different.
+    """
+    ship, signals = model.ship, common_commands(data)
+    its = [a for a in actuators(ship.description) if outage.id == f"{a.part.name}{OUTAGE}"]
+    if not (signals and its):
+        return []
+    columns = [*_columns(its[0], len(signals) != len(ship.layouts[0].commands))]
+    found = []
+    for number, w in enumerate(data):
+        here = model.during(w.run.name)
+        times = [(here.value(a), here.value(b)) for a, b in outage.search.intervals]
+        works = here.plus({b: -here.value(b) for _, b in outage.search.intervals})
+        for start, end in times:
+            rows = slice(*np.searchsorted(w.run.time, (start, end)))
+            if rows.stop > rows.start:
+                parts = [np.zeros((v.middle.size, 3)) for v in data]
+                parts[number] = _held(w, works, rows, columns)
+                found.append(np.concatenate(parts))
+    return found
+
+
+def _held(w: WeakWindows, model: Model, rows: slice, columns: Sequence[int]) -> np.ndarray:
+    """(K, 3), force of commands in some rows of a run that are held, beyond that of none."""
+    forces, given = [], w.run.given
+    for size in (0.0, float(np.sqrt(np.mean(given[:, columns[0]] ** 2)))):
+        held = given.copy()
+        held[rows, columns] = [size, *np.median(given[rows, columns[1:]], axis=0)]
+        forces.append(model_error([w.commanded_as(w.run.with_given(held))], model))
+    return forces[0] - forces[1]
+
+
+def _columns(a: Actuator, apart: bool) -> range:
+    """Columns of an actuator's commands, which are its own (``apart``) or those of its group."""
+    count = len(a.law.commands)
+    return range(a.own, a.own + count * len(a.sides)) if apart else range(a.first, a.first + count)
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:

@@ -1,7 +1,7 @@
 """The conclusion of a search (diagnosis/search/conclusion.py) on a model error that is linear in all values."""
 
 from dataclasses import dataclass
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ class Point:
     values: dict
     offset: np.ndarray
     start: Start = START
+    failing = MappingProxyType({})  # effects with intervals
 
     @property
     def fitted(self):
@@ -65,7 +66,8 @@ class Point:
 
     @property
     def ship(self):
-        return SimpleNamespace(effects=dict.fromkeys("ABC", SimpleNamespace(kind="environment", id="")))
+        effect = SimpleNamespace(kind="environment", id="", search=SimpleNamespace(intervals=()))
+        return SimpleNamespace(effects=dict.fromkeys("ABC", effect) | self.failing)
 
 
 PRIOR = SimpleNamespace(std={"X_u": 0.2, "N_r": 0.0}, mean={"X_u": -1.0, "N_r": -2.0}, size=2)
@@ -284,6 +286,26 @@ def test_without_a_modulated_force_an_effect_is_as_sure(monkeypatch):
     monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: True)
     monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: [])
     assert {(f.evidence.listed, f.modulation) for f in reported().findings().effects} == {(1.0, "")}
+
+
+@pytest.mark.parametrize("size", [0.0, 50.0])
+def test_an_outage_is_weighed_against_a_held_command_in_its_intervals(monkeypatch, size):
+    """By the densities of the model error, in which the held command is one more normal coefficient."""
+    outage = SimpleNamespace(kind="actuator", id="", search=SimpleNamespace(intervals=(("s", "e"),)))
+    monkeypatch.setattr(Point, "failing", {"A": outage})
+    monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: False)
+    force = size * SIGMA * np.random.default_rng(5).standard_normal((K, 3))
+    monkeypatch.setattr(conclusion, "held_forces", lambda data, model, effect: [force])
+    s = reported()
+    (first, *others) = s.findings().effects
+    problem, charged = s._linear(())
+    column = (WEIGHT * force).ravel()
+    H = problem.also_uncertain(column[:, None])
+    odds = [p.log_evidence(np.ones(p.offset.size), charged) for p in (problem, H)]
+    assert first.evidence.listed == pytest.approx(1.0 / (1.0 + np.exp(odds[1] - odds[0])), rel=1e-6)
+    assert first.modulation == "the actuator held at a constant command"
+    assert (first.evidence.listed > 0.9) == (size > 0.0), "that is no force, which explains as much"
+    assert {f.modulation for f in others} == {""}
 
 
 def test_findings_of_some_effects_are_fitted_anew():

@@ -292,8 +292,8 @@ def test_parameters_are_in_units_of_the_ship_and_coefficients_in_standard_deviat
     assert p.theta(at) == pytest.approx([0.4 / units[0], 0.0, *at.offset])
     expected = [4.0 * units[0] ** 2, 25.0 * units[1] ** 2, *[1.0] * prior.size]
     assert p.precision == pytest.approx(np.diag(expected))
-    steps = {"lag": 0.4, "V_n": SMALL * units[1], **prior.std}
-    assert p._steps == pytest.approx({n: SMALL * s for n, s in steps.items()})
+    steps = {"lag": max(0.4, units[0]), "V_n": units[1], **prior.std}
+    assert p._steps == pytest.approx({n: SMALL**2 * s for n, s in steps.items()})
 
 
 @given(st.lists(st.floats(0.0, 2.0), min_size=4, max_size=4))
