@@ -2,13 +2,17 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import ttest_1samp
 from support.planted import voyages
 
 from diagnosis import Model
 from diagnosis.predictors.parameter_set import read_model, write_model
 from diagnosis.predictors.ship_model import of_run
+from diagnosis.runs.run_constants import CHANCE
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
-from diagnosis.search.prediction_fit.other_runs import shrunk_mean, with_other_runs
+from diagnosis.search.prediction_fit.other_runs import has_a_side, shrunk_mean, with_other_runs
 from diagnosis.session import begin
 
 FOULED = {of_run("delta_X_absu_u", f"run{k}"): x for k, x in enumerate((-2.0, -3.0, -4.0))}
@@ -121,3 +125,14 @@ def test_a_test_run_is_predicted_with_the_mean_of_the_runs_before():
     assert np.sqrt(d.posterior.covariance[k, k]) > 2.0
     test = d.comparison.evaluations[-1]
     assert test.after.position < 0.6 * test.before.position
+
+
+@given(st.lists(st.floats(-1.0, 1.0).map(lambda x: round(x, 3)), min_size=2, max_size=8, unique=True))
+def test_values_have_a_side_by_student_s_t(values):
+    assert has_a_side(np.array(values)) == (ttest_1samp(values, 0.0).pvalue < CHANCE)
+
+
+def test_weather_that_is_alike_in_all_runs_is_expected_in_others():
+    alike = {of_run("V_e", f"run{k}"): x for k, x in enumerate((0.19, 0.21, 0.22, 0.22, 0.21))}
+    after, _ = with_other_runs(Model().plus(alike), JointPosterior.nothing())
+    assert after.value("V_e") == pytest.approx(0.21, abs=0.001)

@@ -5,8 +5,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from ...predictors import Model
+from ...runs.run_constants import CHANCE
 from ..refinement import timed
 from .joint_posterior import JointPosterior
 
@@ -35,19 +37,31 @@ def shrunk_mean(values: np.ndarray) -> float:
     return mean - variance / mean if mean * mean > variance else 0.0
 
 
+def has_a_side(values: np.ndarray) -> bool:
+    """Whether the mean of values (k,) of single runs differs from zero by more than chance."""
+    error = float(values.std(ddof=1)) / np.sqrt(values.size)
+    return abs(float(values.mean())) > error * float(stdtrit(values.size - 1, 1.0 - 0.5 * CHANCE))
+
+
 def differing_by_run(model: Model) -> Iterator[OtherRuns]:
     """The parameters with values of several runs, but times within a run, which no other run has.
 
-    Weather has no usual side: its mean is zero.
+    Weather has no usual side, unless the values show one: where the means of all its components may be
+    zero, by Student's t, they are.
     """
     weather = [e for e in model.ship.effects.values() if e.kind == "environment"]
+    of_runs: dict[str, np.ndarray] = {}
     for name in dict.fromkeys(n for values in model.runs.values() for n in values):
         own = [of_run[name] for of_run in model.runs.values() if name in of_run]
         if timed(model.ship, name) is None and len(own) > 1:
-            values = np.array(own) - model.value(name)
-            mean = 0.0 if any(name in e.coefficients for e in weather) else shrunk_mean(values)
-            variance = float(np.square(values - mean).sum()) / (values.size - 1)
-            yield OtherRuns(name, mean, variance)
+            of_runs[name] = np.array(own) - model.value(name)
+    sided = {n for n, values in of_runs.items() if has_a_side(values)}
+    for name, values in of_runs.items():
+        of_weather = [e for e in weather if name in e.coefficients]
+        expected = not of_weather or any(sided.intersection(e.coefficients) for e in of_weather)
+        mean = shrunk_mean(values) if expected else 0.0
+        variance = float(np.square(values - mean).sum()) / (values.size - 1)
+        yield OtherRuns(name, mean, variance)
 
 
 def with_other_runs(model: Model, posterior: JointPosterior) -> tuple[Model, JointPosterior]:
