@@ -8,15 +8,13 @@ import platform
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from filelock import FileLock, Timeout
 
 from cybership.scratch_folder import sweep
 
@@ -29,6 +27,7 @@ from ..errors import InputError, SimulationError, not_written
 from ..files import update_json, write_roomy_json
 from ..interrupts import Held
 from ..process.run_state import CAMPAIGN, STATE
+from ..results.folder_lock import locked_folder
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from .campaign_file import LoadedCampaign
@@ -113,7 +112,8 @@ def run_campaign(
         # Workers would wait for each other, deaf to interrupts.
         if note := prepare_library(loaded.base.native):
             show(f"note: {note}")
-        with _only_one(folder), closing(Journal(folder)) as journal:
+        taken = f"another campaign runs in '{folder}'"
+        with locked_folder(folder, LOCK, taken), closing(Journal(folder)) as journal:
             if journal.unread:
                 show(
                     f"note: {journal.unread} lines of '{JOURNAL}' do not describe a run: those "
@@ -325,23 +325,6 @@ class _Work:
             for n, pair in self.known.items()
             if numbers is None or n in numbers or pair[1] in self.earlier
         ]
-
-
-@contextmanager
-def _only_one(folder: Path) -> Iterator[None]:
-    """A folder in which no other campaign runs."""
-    lock = FileLock(folder / LOCK, timeout=0)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except Timeout:
-        raise InputError(f"another campaign runs in '{folder}'") from None
-    except OSError as error:
-        raise InputError(not_written(folder, error)) from None
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 @cache

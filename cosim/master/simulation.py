@@ -105,7 +105,7 @@ def simulate(
                 first = given.with_name(scenario.name)
                 moved = f"note: another run is in '{first}'; this one is written to '{given}'"
             results = ResultFolder(folder, moved)
-            at_end.callback(results.leave)
+            at_end.enter_context(results)
             result, recorder = _run(
                 system, results, description, realtime, show, progress, pool, pictures
             )

@@ -34,6 +34,7 @@ from scipy.special import expit, logsumexp
 from fmus.actuators.actuation import actuators
 from fmus.actuators.actuator import Actuator
 from fmus.effects import Effect
+from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import common_commands
@@ -136,12 +137,11 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
     if not (signals := common_commands(data)):
         return
     base, ship = model_error(data, model), model.ship
-    apart = len(signals) != len(ship.layouts[0].commands)
     for a in actuators(ship.description):
         effect = ship.effects.get(f"{LOSS}{a.part.name}")
         if effect is None:
             continue
-        own = _columns(a, apart)
+        own = _columns(a, signals, ship)
         lost = base - model_error(data, model.plus({effect.parameters[0].name: 1.0}))
         if not lost.any():
             continue
@@ -168,13 +168,13 @@ def held_forces(data: Sequence[WeakWindows], model: Model, outage: Effect) -> li
         outage: of an actuator, with intervals.
 
     Returns:
-        None where the outage is of no single actuator, or the commands of runs are different.
+        Empty where the outage is of no single actuator, or the commands of runs are different.
     """
     ship, signals = model.ship, common_commands(data)
     its = [a for a in actuators(ship.description) if outage.id == f"{a.part.name}{OUTAGE}"]
     if not (signals and its):
         return []
-    columns = [*_columns(its[0], len(signals) != len(ship.layouts[0].commands))]
+    columns = [*_columns(its[0], signals, ship)]
     found = []
     for number, w in enumerate(data):
         here = model.during(w.run.name)
@@ -199,9 +199,9 @@ def _held(w: WeakWindows, model: Model, rows: slice, columns: Sequence[int]) -> 
     return forces[0] - forces[1]
 
 
-def _columns(a: Actuator, apart: bool) -> range:
-    """Columns of an actuator's commands, which are its own (``apart``) or those of its group."""
-    count = len(a.law.commands)
+def _columns(a: Actuator, signals: Sequence[str], ship: Ship) -> range:
+    """Columns of an actuator's commands in a run: its own, or those of its group."""
+    count, apart = len(a.law.commands), len(signals) != len(ship.layouts[0].commands)
     return range(a.own, a.own + count * len(a.sides)) if apart else range(a.first, a.first + count)
 
 

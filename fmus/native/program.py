@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 from ..declare import Component, flatten, packer, rebuild, width
 from ..fmi.trace import Operand, TraceError
 from ..ops import Number
-from .tape import Kernels, RecordedFunction, RecordedValue, Tape, is_condition, is_number, like
+from .tape import Kernels, RecordedFunction, RecordedValue, Tape, is_condition, like
 
 T = TypeVar("T", bound=tuple[object, ...])
 # What a function does, and (array, the results that it gets), together all results.
@@ -52,7 +52,7 @@ def program(component: Component) -> Program:
     """Record a component.
 
     Raises:
-        TraceError: it does with a value what can be done with a number only, or gives something else.
+        TraceError: it does with a value what can be done with a number only.
     """
     try:
         return _recorded(component)
@@ -93,8 +93,6 @@ def _recorded(component: Component) -> Program:
         cast(Number, tape.variable("h")),
     )
     after, given = flatten(state), flatten(outputs)
-    if wrong := [x for x in (*init.results, *after, *given) if not is_number(x)]:
-        raise TraceError(f"a state or an output is {wrong[0]!r}, and no number")
     if len(after) != states or len(given) != width(component.outputs):
         raise TraceError("a step does not give as many numbers as are declared")
     return Program(component, init, prepare, tape.recording(after + given), kernels.recordings, states)
