@@ -402,6 +402,14 @@ def dask(folder, *arguments):
     )
 
 
+def address_in(file):
+    """The address in the file of a scheduler, or nothing while the file is missing or not yet whole."""
+    try:
+        return json.loads(file.read_text())["address"]
+    except (FileNotFoundError, json.JSONDecodeError):
+        return None
+
+
 @pytest.fixture
 def scheduler(tmp_path):
     """A scheduler with two workers, each a process: address and the processes of the workers."""
@@ -412,8 +420,7 @@ def scheduler(tmp_path):
     try:
         for _ in range(2):
             started.append(dask(tmp_path, "worker", "--nthreads", 1, "--no-nanny", *common))
-        once_there(file.exists)
-        yield json.loads(file.read_text())["address"], started[1:]
+        yield once_there(lambda: address_in(file)), started[1:]
     finally:
         for process in started:
             process.kill()

@@ -159,7 +159,9 @@ def test_columns_are_those_of_the_library(library):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("terms", [1, 3, 7])
 def test_forward_regression_that_runs_once_finds_what_the_package_finds(terms):
-    selection = pytest.importorskip("sysidentpy.model_structure_selection", reason="no sysidentpy")
+    selection = pytest.importorskip(
+        "sysidentpy.model_structure_selection", reason="not in the extra dev: sysidentpy"
+    )
     narx = import_module("benchmarks.ships.entries.narx")
     draw = np.random.default_rng(4)
     psi = draw.normal(size=(300, 9))
