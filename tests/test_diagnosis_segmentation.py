@@ -22,6 +22,7 @@ from diagnosis.search.nonlinear.segmentation import (
     programmed,
     programmed_in,
     segmented,
+    shares_of_rows,
 )
 from fmus.scale import REFERENCE
 
@@ -65,8 +66,37 @@ def test_intervals_are_times_of_their_runs_and_back():
     assert p.keys(SPANS)[1] == ("start_2@a", "end_2@a")
     assert p.spans({"start_1@b": -9.0, "end_1@b": 99.0}) == [(240, 600)], "what lies outside is cut"
     assert p.spans({"start_1@a": 8.0}) == [(60, 240)]
-    assert p.spans({"start_2@a": 8.04, "end_2@a": 9.06}) == [(60, 71)], "to the nearest cell"
+    assert p.spans({"start_2@a": 8.04, "end_2@a": 9.06}) == [pytest.approx((60.4, 70.6))]
     assert [p.section(cell).run for cell in (0, 239, 240, 599)] == ["a", "a", "b", "b"]
+
+
+def test_cost_of_whole_cells_is_that_of_parts_of_them():
+    p = problem(noise=0.1)
+    close = [(a + 1e-9, b - 1e-9) for a, b in SPANS]
+    assert p.cost(close) == pytest.approx(p.cost(SPANS), rel=1e-6)
+    assert p.dead([(60.25, 62.5)])[59:64].tolist() == [0.0, 0.75, 1.0, 0.5, 0.0]
+    assert p.dead([(60.25, 60.5)])[60] == 0.25
+
+
+@pytest.mark.parametrize("parts", [(0.3, 0.8), (0.05, 0.5)])
+def test_change_points_are_found_between_cells(parts):
+    spans = [(60 + parts[0], 110 + parts[1]), (300 - parts[1], 420 - parts[0])]
+    p = problem()
+    p = replace(
+        p, y=p.columns @ p.dead(spans) + 1e-3 * np.random.default_rng(1).standard_normal(p.y.size)
+    )
+    found = segmented(p.weighted(np.full(3, 1e-3)))
+    assert np.array(found) == pytest.approx(np.array(spans), abs=0.02)
+    assert np.array(p.spans(p.values(found))) == pytest.approx(np.array(found), abs=1e-4)
+
+
+def test_a_row_longer_than_a_cell_counts_in_each_by_its_time():
+    rows = shares_of_rows(np.array([0.5, 2.75, 3.0, 3.25]), 4).toarray()
+    by_hand = [[0.5, 1, 0.75, 0], [0, 0, 0.25, 0], [0, 0, 0, 0.25], [0, 0, 0, 0.25]]
+    lengths = np.array([2.25, 0.25, 0.25, 0.25])
+    assert rows * lengths[:, None] == pytest.approx(np.array(by_hand))
+    beyond = shares_of_rows(np.array([-1.5, 4.0]), 3).toarray()
+    assert beyond.sum(axis=1) == pytest.approx(1.0), "what is outside counts at the ends"
 
 
 def test_what_lasts_has_no_end_and_begins_after_the_start_of_time():

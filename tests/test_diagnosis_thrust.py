@@ -112,6 +112,30 @@ def test_mean_force_over_each_interval_from_series_is_that_of_the_steps(values):
 
 @pytest.mark.parametrize(
     "values",
+    [
+        {"bow_failure_time": 3.013},
+        {"bow_outage_start_1": 3.004, "bow_outage_end_1": 7.519},
+        {"bow_outage_start_1": 3.004, "bow_outage_end_1": 3.011, "vsp_outage_start_1": 2.0, "vsp_outage_end_1": 3.009},
+    ],
+    ids=["for good", "for a time", "three changes in one row"],
+)  # fmt: skip
+def test_a_failure_between_two_samples_has_the_mean_force_of_both_sides(values):
+    """As in rows that begin at the change points, with the same commands and speeds."""
+    run, nu, model = base(), true_nu(), Model(thrusters=values)
+    every = np.union1d(run.time, [*values.values()])
+    row = np.searchsorted(run.time, every, side="right") - 1
+    split = replace(run, time=every, pose=run.pose[row], tau_cmd=run.tau_cmd[row])
+    parts = acting(split, model, nu[row])[:-1] * np.diff(every)[:, None]
+    whole = np.array([parts[row[:-1] == k].sum(axis=0) for k in range(run.time.size - 1)])
+    force = acting(run, model, nu)[:-1]
+    assert force == pytest.approx(whole / np.diff(run.time)[:, None], abs=1e-12)
+    there = np.searchsorted(run.time, max(values.values())) - 1
+    rounded = acting(run, Model(thrusters=dict.fromkeys(values, run.time[there])), nu)[there]
+    assert np.abs(force[there] - rounded).max() > 1e-3, "the time within the row matters"
+
+
+@pytest.mark.parametrize(
+    "values",
     [v for e, v in BY_EFFECT.items() if "vsp" in e],
     ids=[e for e in BY_EFFECT if "vsp" in e],
 )

@@ -209,6 +209,20 @@ def test_model_error_of_the_analyses_is_that_of_the_ship(otter_log):
     }
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [40.0, 40.07])
+def test_a_propeller_that_dies_late_in_one_short_run_is_no_curve_over_the_speed(tmp_path, start):
+    """The ship is slow from then on alone; without noise an edge that is off by a row would count."""
+    options = {"thrusters.port_outage_start_1": start, "thrusters.port_outage_end_1": 70.0}
+    log = tmp_path / "run"
+    cosim.simulate("otter_zigzag", log, stop=70.0, pictures=False, set=options)
+    (found,) = diagnosis.diagnose(diagnosis.load(log)).content["effects"]
+    assert found["id"] == "port_failure"
+    assert found["confidence"] > 0.95
+    (time,) = found["coefficients"].values()
+    assert time["value"] == pytest.approx(start, abs=0.015), "commands act at steps of 0.02 s"
+
+
 @pytest.fixture(scope="module")
 def cybership2_log(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cybership2") / "run"

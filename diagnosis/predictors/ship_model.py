@@ -252,6 +252,12 @@ class Model:
         return self.ship.thrusters.prepared(parameters(self.ship.thrusters, self.thrusters))
 
     @cached_property
+    def change_points(self) -> tuple[float, ...]:
+        """Times [s] at which failures begin and end in every run, in order."""
+        timed = self.ship.effects.timed
+        return tuple(sorted({x for n, x in self.thrusters.items() if n in timed}))
+
+    @cached_property
     def mass(self) -> np.ndarray:
         """(3, 3), mass matrix M [kg, kg m, kg m2], effects included."""
         return np.array(mass_matrix(self.hull.hull.inertia))

@@ -87,6 +87,8 @@ def inflow(s: State, b: PreparedVessel) -> tuple[Any, Any, Any]:
 def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """tau (n, 3) [N, N, N m] that acts from each sample to the next.
 
+    Where a failure begins or ends between two samples that is the mean of the forces before and after.
+
     Args:
         run: its time and power.
         model: whose thrusters act.
@@ -95,16 +97,29 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     """
     drive = drive_of(run, model)
     layout = drive.effects.layout
-    if run.power is not None:
-        drive = layout.powered(drive, run.power.T)
-    total = np.zeros((3, run.time.size))
     points = between[1:] if len(between) > 1 else between
-    u, v, r = nu.T
-    now = layout.running(run.time, u, v, r, tuple(between[0]), drive)
-    for acting in points:
-        force = layout.act(tuple(acting), now, drive)
-        for axis in range(3):
-            total[axis] += force[axis] / len(points)
+
+    def force(rows: Any, time: np.ndarray) -> np.ndarray:
+        """(3, ...), in some rows, at times at which a failure may have begun since."""
+        powered = drive if run.power is None else layout.powered(drive, run.power[rows].T)
+        u, v, r = nu[rows].T
+        now = layout.running(time, u, v, r, tuple(between[0][:, rows]), powered)
+        total = np.zeros((3, time.size))
+        for acting in points:
+            given = layout.act(tuple(acting[:, rows]), now, powered)
+            for axis in range(3):
+                total[axis] += given[axis] / len(points)
+        return total
+
+    total = force(slice(None), run.time)
+    before = run.time[0]
+    for change in model.change_points:
+        if run.time[0] < change < run.time[-1]:
+            row = int(np.searchsorted(run.time, change, side="right")) - 1
+            begin, end = run.time[row : row + 2]
+            sides = force([row, row], np.array([max(begin, before), change]))
+            total[:, row] += (end - change) / (end - begin) * (sides[:, 1] - sides[:, 0])
+            before = change
     return total.T
 
 

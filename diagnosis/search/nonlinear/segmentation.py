@@ -11,12 +11,12 @@ some n places chance finds one at which the sum falls by 2 log n, no more for an
 
 With b held and windows taken as independent, dynamic programming gives the least sum (Auger and Lawrence
 1989; with a charge for each change Killick, Fearnhead and Eckley 2012). Then b is fitted, and so on; at
-the end the change points are moved one by one while the exact sum falls.
+the end the change points are moved one by one while the exact sum falls, at last by parts of a cell.
 
 Each run has intervals of its own: its cells follow those of the run before, and no interval lies in two.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,13 +34,13 @@ from ...predictors.ship_model import of_run
 from ...predictors.uncertainty import FLOOR
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
 from ...runs.cleaning import BRIEF, Z95
-from ...runs.run_constants import STEPS
+from ...runs.run_constants import DIGITS, STEPS
 from ..most_likely import ENOUGH, ridge
 from .interval_sums import IntervalSums
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
+Spans = list[tuple[float, float]]  # intervals in cells, the second end not included
 
 
 class RunCells(NamedTuple):
@@ -95,9 +95,9 @@ class SegmentationProblem:
 
         What is so most of the time is no failure, but the rule, such as a dead band of small commands.
         """
-        dead: Counter[str] = Counter()
+        dead: dict[str, float] = defaultdict(float)
         for a, b in spans:
-            dead[self.section(a).run] += self.work[a:b].sum()
+            dead[self.section(a).run] += float(self.dead([(a, b)]) @ self.work)
         return self.lasting or all(2.0 * share <= 1.0 for share in dead.values())
 
     def without_end(self, spans: Spans) -> bool:
@@ -105,7 +105,7 @@ class SegmentationProblem:
         runs = [self.section(a).run for a, _ in spans]
         return len(set(runs)) == len(runs) and all(b == self.section(a).end for a, b in spans)
 
-    def section(self, cell: int) -> RunCells:
+    def section(self, cell: float) -> RunCells:
         """The section that a cell lies in."""
         return next(s for s in self.sections if cell < s.end)
 
@@ -137,7 +137,7 @@ class SegmentationProblem:
             used[s.run] += 1
         return found
 
-    def seconds(self, s: RunCells, cell: int) -> float:
+    def seconds(self, s: RunCells, cell: float) -> float:
         """Time [s] in a run; where 0 would mean that an effect never begins, a cell later."""
         time = float(f"{s.first + self.cell * (cell - s.start):f}")  # so that it reads as it was meant
         return max(time, self.cell) if self.lasting else time
@@ -159,15 +159,19 @@ class SegmentationProblem:
                 if start in values:
                     times = values[start], values.get(end, np.inf)
                     a, b = (min((t - s.first) / self.cell, s.end - s.start) for t in times)
-                    found.append((s.start + max(round(a), 0), s.start + round(b)))
+                    found.append((s.start + max(a, 0.0), s.start + b))
+        return found
+
+    def dead(self, spans: Spans) -> np.ndarray:
+        """(m,), the part of each cell that lies in the intervals."""
+        found, cells = np.zeros(self.work.size), np.arange(self.work.size)
+        for a, b in spans:
+            found += np.clip(np.minimum(b, cells + 1.0) - np.maximum(a, cells), 0.0, 1.0)
         return found
 
     def left(self, spans: Spans) -> np.ndarray:
         """(3 K,), model error without what the intervals add to it."""
-        dead = np.zeros(self.work.size)
-        for a, b in spans:
-            dead[a:b] = 1.0
-        return self.y - self.columns @ dead
+        return self.y - self.columns @ self.dead(spans)
 
     def fitted(self, left: np.ndarray) -> np.ndarray:
         """What the nuisance parameters leave over (3 K,)."""
@@ -202,8 +206,14 @@ class SegmentationProblem:
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
         points = sum(1 + (b < self.section(a).end) for a, b in spans)
-        (along, whole), given = self._whole, self._sums.linear(spans)
-        along, square = along - given[:-1], whole - 2.0 * given[-1] + self._sums.square(spans)
+        whole_cells = [(int(a), int(b)) for a, b in spans]
+        if whole_cells == spans:
+            (along, whole), given = self._whole, self._sums.linear(whole_cells)
+            along = along - given[:-1]
+            square = whole - 2.0 * given[-1] + self._sums.square(whole_cells)
+        else:
+            left = self.left(spans)
+            along, square = self.nuisance.T @ left, left @ left
         cost = float(square) + self.charge * points
         if not self.offset.size:
             return cost
@@ -214,7 +224,7 @@ class SegmentationProblem:
 
 def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
     """The intervals of least cost, from those of a start or from none."""
-    best = moved(p, start or [])
+    best = moved(p, [(round(a), round(b)) for a, b in start or []])
     least = p.cost(best)
     whole = np.asarray(p.columns.sum(axis=1)).ravel()
     for _ in range(STEPS):
@@ -227,7 +237,38 @@ def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
         if cost > least - ENOUGH:
             break
         best, least = found, cost
-    return best
+    return sharpened(p, best)
+
+
+def sharpened(p: SegmentationProblem, spans: Spans) -> Spans:
+    """Intervals with change points moved within the cells beside them, where that lowers the cost."""
+    for _ in range(STEPS):  # those of one interval may depend on each other
+        before = spans
+        for k, pair in enumerate(spans):
+            section = p.section(pair[0])
+            for side, place in enumerate(pair):
+                if place not in (section.start, section.end):
+                    spans = _sharpened(p, spans, k, side)
+        if p.cost(before) - p.cost(spans) < ENOUGH:
+            break
+    return spans
+
+
+def _sharpened(p: SegmentationProblem, spans: Spans, k: int, side: int) -> Spans:
+    """Intervals with one change point where a parabola is least: within a cell the cost is one."""
+
+    def moved_to(x: float) -> Spans:
+        a, b = spans[k]
+        return [*spans[:k], (a, x) if side else (x, b), *spans[k + 1 :]]
+
+    place, trials = spans[k][side], [spans]
+    for low in (np.ceil(place) - 1.0, np.floor(place)):
+        first, middle, last = (p.cost(moved_to(low + part)) for part in (0.0, 0.5, 1.0))
+        bent = first - 2.0 * middle + last
+        if bent > 0.0:
+            least = low + min(max(0.5 + 0.25 * (first - last) / bent, 0.0), 1.0)
+            trials.append(moved_to(float(least)))
+    return min((t for t in trials if t[k][0] < t[k][1]), key=p.cost)
 
 
 def programmed_in(p: SegmentationProblem, s: RunCells, gain: np.ndarray) -> Iterator[tuple[int, int]]:
@@ -363,10 +404,9 @@ def problem(
         named = {of_run(n, w.run.name): time for n, time in whole.items() if n}
         dead = model.plus({n: time - model.value(n) for n, time in named.items()})
         lost = thrust_along(w, model) - thrust_along(w, dead)
-        place = np.clip(((w.run.time - first) / cell + 1e-6).astype(int), 0, count - 1)
-        worked = np.bincount(place, np.any(lost != 0.0, axis=1), count)
+        where = shares_of_rows((w.run.time - first) / cell, count)
+        worked = where.T @ np.any(lost != 0.0, axis=1)
         work.append(worked / max(worked.sum(), 1.0))
-        where = csr_matrix((np.ones(place.size), (np.arange(place.size), place)), (place.size, count))
         force = [w.held @ diags(-axis) @ where for axis in lost.T]
         by_axis = vstack([sum(f * g for f, g in zip(force, gain, strict=True)) for gain in turned.T])
         rows = np.arange(3 * w.middle.size).reshape(3, -1).T.ravel()  # axes of a window together
@@ -384,6 +424,23 @@ def problem(
     y, Z, time = base.ravel(), Z.reshape(base.size, -1), np.concatenate(work)
     parts = sections, lasting, cell, y, columns, middle, Z, precision, offset, unit, time, scale
     return SegmentationProblem(*parts)
+
+
+def shares_of_rows(place: np.ndarray, count: int) -> csr_matrix:
+    """(n, count), share of the time from each row to the next that lies in each cell.
+
+    Args:
+        place: (n,), of the rows in cells; what is before the first cell or after the last counts there.
+        count: of the cells.
+    """
+    ends = np.append(place, place[-1] + np.median(np.diff(place)))
+    first = np.floor(ends[:-1] + DIGITS).astype(int)
+    many = np.maximum(np.ceil(ends[1:] - DIGITS).astype(int) - first, 1)
+    row = np.repeat(np.arange(place.size), many)
+    cell = first[row] + np.arange(row.size) - np.repeat(np.cumsum(many) - many, many)
+    inside = np.minimum(ends[row + 1], cell + 1.0) - np.maximum(ends[row], cell)
+    parts = inside / np.diff(ends)[row]
+    return csr_matrix((parts, (row, np.clip(cell, 0, count - 1))), (place.size, count))
 
 
 def _set(model: Model, name: str, w: WeakWindows) -> bool:
