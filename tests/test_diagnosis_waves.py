@@ -18,10 +18,12 @@ from diagnosis.search.nonlinear.waves import (
     CONSTANT,
     PEAK,
     Peak,
+    changes_per_second,
     command_interval,
     constancy,
     find_waves,
     followed,
+    follows_commands,
     inside,
     peak,
     segments_above,
@@ -55,14 +57,37 @@ def held(run, seconds):
     return replace(run, tau_cmd=run.tau_cmd[np.arange(run.time.size) // count * count])
 
 
-@pytest.mark.parametrize(("seconds", "sure"), [(0.3, True), (1.0, False)])
+@pytest.mark.parametrize(("seconds", "sure"), [(0.3, True), (0.8, True), (1.0, False)])
 def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure):
-    """The waves have a period of 1.6 s; a force by commands in between may look the same."""
+    """The waves have a period of 1.6 s; held for longer than half of it, commands make a peak of their own."""
     run = sail(240.0, H, ship={"wave_force": 0.1, "wave_peak": 4.0})[0]
     found = find_waves([smoothed(held(run, seconds))], Model(), np.random.default_rng(0))
-    assert found is not None
-    assert (found.confidence > 0.8) == sure
-    assert found.confidence > 0.4
+    assert (found is not None) == sure
+    if found is not None:
+        assert found.peak == pytest.approx(4.0, abs=0.3)
+        assert found.confidence > 0.8
+
+
+def test_what_a_model_makes_wrong_of_a_zig_zag_is_no_wave():
+    """A rudder force on sway and yaw that the model lacks a part of, at the third harmonic too."""
+    run = sail(240.0, H)[0]
+    order = np.sign(np.sin(1.35 * run.time))[:, None] * [0.0, 1.0, 0.1]
+    zigzag = replace(run, tau_cmd=np.median(run.tau_cmd, axis=0) + 0.1 * order)
+    assert changes_per_second(zigzag) == pytest.approx(1.35 / np.pi, rel=0.05)
+    assert find_waves([smoothed(zigzag)], Model(), np.random.default_rng(0)) is None
+
+
+def test_what_follows_commands_has_one_gain_and_phase_in_all_stretches():
+    rng, t = np.random.default_rng(2), 0.1 * np.arange(900)
+    commands = [np.sign(np.sin(1.3 * t + p))[:, None] for p in (0.0, 1.0)]
+    late = [np.roll(c[:, 0], 5) + 0.1 * rng.standard_normal(t.size) for c in commands]
+    at, row = 3.9 / 2.0 / np.pi, 0.04
+    assert follows_commands(late, commands, 0.1, at, row)
+    assert not follows_commands([late[0], -late[1]], commands, 0.1, at, row), (
+        "another sign in the second"
+    )
+    waves = [np.sin(3.9 * t + p) for p in (0.5, 3.5 + np.pi)]
+    assert not follows_commands(waves, commands, 0.1, at, row), "a phase of its own in each"
 
 
 def test_an_oscillation_of_constant_period_may_be_that_of_an_actuator():

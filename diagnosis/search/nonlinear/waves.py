@@ -15,7 +15,7 @@ from fmus.vessel.vessel import State
 
 from ...execution.parallel import for_each
 from ...predictors import Model
-from ...predictors.thrust import Response, inflow, thrust
+from ...predictors.thrust import Response, inflow, thrust, unwrapped
 from ...predictors.weak_form import acceleration, by_mass, in_wind
 from ...runs import Run, Smoothed, SmoothMotion, body_acceleration, without_commands
 from ...runs.cleaning import BRIEF, between
@@ -89,17 +89,22 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     around = float(np.ptp(BAND)) / time
     level, found = peak(frequency, power, floor, band, around)
     count = segments.shape[-1]
-    least = PEAK + FEW / count
+    least, at = PEAK + FEW / count, float(frequency[found.row])
+    commands = [x for part in parts for x in part[3]]
+    errors = [x[:, found.axis] for x in left]
     if found.height < least:
+        return None
+    # Commands that change less than twice in a period answer no waves: what follows them is not waves.
+    held = all(changes_per_second(s.track.run) < 2.0 * at for s in runs)
+    if held and follows_commands(errors, commands, BRIEF * time, at, float(frequency[1])):
         return None
     drawn = (segments[..., d].mean(axis=-1) for d in rng.integers(0, count, (REPLICATES, count)))
     heights = np.array([peak(frequency, each, floor, band, around)[1].height for each in drawn])
-    at = float(frequency[found.row])
     near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
     lasting = segments_above(segments, found, level)
     rare = any(2.0 * at * command_interval(s.track.run) > 1.0 for s in runs)
-    even = constancy([x[:, found.axis] for x in left], BRIEF * time, at) > CONSTANT
+    even = constancy(errors, BRIEF * time, at) > CONSTANT
     energy = extra / model.reference_mass.diagonal()
     alone = bool(energy.max() > (1.0 - NEGLIGIBLE) * energy.sum())
     doubtful = rare or even or alone
@@ -129,17 +134,18 @@ def command_interval(run: Run) -> float:
 
 def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
-) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
-    """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    time, step = smoothed.time, BRIEF * smoothed.scale.time
+) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray, list[np.ndarray]]:
+    """Of a run stretches of its model error, of what drawn noise makes of that, noise (3,), commands."""
+    time, step, track = smoothed.time, BRIEF * smoothed.scale.time, smoothed.track
     motion = without_commands(smoothed)
     error, noise = model_error(smoothed, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
-        pose = np.where(smoothed.agrees, motion.eta + smoothed.noise * each, smoothed.track.pose)
+        pose = np.where(smoothed.agrees, motion.eta + smoothed.noise * each, track.pose)
         other = model_error(smoothed, without_commands(smoothed, pose), model)
         noise += stretches(other - error, time, step)
-    white = 2.0 * smoothed.noise**2 * smoothed.track.periods
-    return stretches(error, time, step), noise, white
+    white = 2.0 * smoothed.noise**2 * track.periods
+    given = np.where(np.isfinite(error[:, :1]), unwrapped(track.run.given, track.run, model), np.nan)
+    return stretches(error, time, step), noise, white, stretches(given, time, step)
 
 
 def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -224,6 +230,38 @@ def constancy(signals: Sequence[np.ndarray], step: float, near: float) -> float:
         at_best += fine[np.abs(twice - 2.0 * near) < near / 2.0].max(initial=0.0)
         total += float((np.abs(z) ** 2).sum())
     return at_best / total if total > 0.0 else 0.0
+
+
+def changes_per_second(run: Run) -> float:
+    """How often commands of a run change [1/s]."""
+    changes = (np.diff(run.given, axis=0) != 0.0).any(axis=1)
+    return float(changes.sum() / (run.time[-1] - run.time[0]))
+
+
+def follows_commands(
+    signals: Sequence[np.ndarray], commands: Sequence[np.ndarray], step: float, at: float, row: float
+) -> bool:
+    """Whether most of an oscillation follows commands, with one gain and phase for each of them.
+
+    What a model makes wrong of commands does so, as at a harmonic of a zig-zag.
+
+    Args:
+        signals, commands: (n,) and (n, k) each.
+        step: between samples [s].
+        at, row: frequency of the oscillation, and the distance to the next one [Hz].
+    """
+    from scipy.signal import detrend
+
+    def around(x: np.ndarray) -> np.ndarray:
+        """Analytic signals (n, k) within two rows of the frequency."""
+        frequency = np.fft.fftfreq(2 * len(x), step)
+        spectrum = np.fft.fft(detrend(x, axis=0), 2 * len(x), axis=0)
+        return np.fft.ifft(np.where(np.abs(frequency - at) < 2.0 * row, spectrum.T, 0.0)).T[: len(x)]
+
+    y = np.concatenate([around(x[:, None]) for x in signals])
+    given = np.concatenate([around(x) for x in commands])
+    left = y - given @ np.linalg.lstsq(given, y, rcond=None)[0]
+    return 2.0 * float(np.sum(np.abs(left) ** 2)) < float(np.sum(np.abs(y) ** 2))
 
 
 def segments_above(segments: np.ndarray, found: Peak, level: np.ndarray) -> int:
