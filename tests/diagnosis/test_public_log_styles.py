@@ -70,6 +70,23 @@ def test_whole_numbers_of_mavlink_are_parts_of_a_degree(tmp_path: Path) -> None:
     is_the_motion(seen(tmp_path / "a.csv", table.drop(columns=["x", "y", "psi"])))
 
 
+def test_whole_numbers_of_ais_are_parts_of_a_minute(tmp_path: Path) -> None:
+    """Positions are in 1/10,000 minutes; 91 and 181 degrees are none, also in this unit."""
+    lat, lon = 59.4292 + NORTH / 111_402.0, 10.4691 + EAST / 56_758.0
+    table = log(lat=np.round(6e5 * lat).astype(int), lon=np.round(6e5 * lon).astype(int)).drop(
+        columns=["x", "y"]
+    )
+    run = seen(tmp_path / "a.csv", table)
+    np.testing.assert_allclose(np.ptp(run.pose[:, 0]), np.ptp(NORTH), atol=0.4)  # rounded to 0.19 m
+    np.testing.assert_allclose(np.ptp(run.pose[:, 1]), np.ptp(EAST), atol=0.4)
+    table.loc[5, ["lat", "lon"]] = 54_600_000, 108_600_000
+    missing = seen(tmp_path / "b.csv", table)
+    assert np.isnan(missing.pose[5, :2]).all()
+    np.testing.assert_allclose(
+        np.delete(missing.pose, 5, 0), np.delete(run.pose, 5, 0), atol=0.2
+    )  # of another median
+
+
 def test_the_yaw_of_a_quaternion_is_a_part_of_it(tmp_path: Path) -> None:
     """Beside the quaternion its yaw from the east is a column of its own in exports of PlotJuggler."""
     yaw = 0.5 * np.pi - PSI

@@ -24,9 +24,10 @@ from .unit_check import TURN, UNITS
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
-WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
+# degrees, of whole numbers in messages of receivers and of MAVLink, and of AIS (ITU-R M.1371)
+WHOLE, AIS = 1e-7, 1.0 / 600_000.0
 NOT_AVAILABLE = {"x": 91.0, "y": 181.0}  # degrees, where there is no position (ITU-R M.1371, AIS)
-TURNS = TURN, TURN / WHOLE, tau  # in degrees, 1e-7 degrees, rad
+TURNS = TURN, TURN / WHOLE, TURN / AIS, tau  # in degrees, whole numbers, rad
 # An angle as a text: 63.44° N, N63.44, 63°26.4'N, 63 26 24.0 N; 63.44°.
 ANGLE = re.compile(
     r"(?P<before>[NSEW])?\s*(?P<deg>[+-]?\d+(?:\.\d+)?)(?:\s*[°º]\s*|\s+|(?=[NSEW])|$)"
@@ -161,20 +162,22 @@ def metres_in_degree(latitude: float) -> dict[str, float]:
 def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
     """The size of the unit of latitudes and longitudes (n,) [degrees].
 
-    Whole numbers beyond degrees and minutes are in 1e-7 degrees. Both within half a turn in rad are rad:
-    in degrees that is the Gulf of Guinea. Next to zero, where simulations start, they are in degrees.
+    Whole numbers beyond degrees and minutes are in 1/10,000 minutes if both may be, else 1e-7 degrees.
+    Both within half a turn in rad are rad. In the smaller unit that would be the Gulf of Guinea. Next to
+    zero, where simulations start, they are in degrees.
     """
     values = np.concatenate([latitude, longitude])
-    if (values == np.round(values)).all() and np.abs(values).max() > 1e6:
-        return WHOLE
     reach = [np.abs(angle).max() for angle in (latitude, longitude)]
+    if (values == np.round(values)).all() and max(reach) > 1e6:
+        return AIS if AIS * reach[0] <= TURN / 4.0 and AIS * reach[1] <= TURN / 2.0 else WHOLE
     is_rad = reach[0] <= np.pi / 2 and reach[1] <= np.pi and max(reach) > NEAR_ZERO
     return float(np.degrees(1.0)) if is_rad else 1.0
 
 
 def available(signal: str, degrees: np.ndarray) -> np.ndarray:
-    """Latitudes (x) or longitudes (y) without those that are not available (ITU-R M.1371, AIS)."""
-    return np.where(np.abs(degrees) == NOT_AVAILABLE[signal], np.nan, degrees)
+    """Latitudes (x) or longitudes (y), in degrees or as AIS sends them, without those that are none."""
+    none = NOT_AVAILABLE[signal]
+    return np.where(np.isin(np.abs(degrees), (none, none / AIS)), np.nan, degrees)
 
 
 def is_geographic(signal: str, column: Column) -> bool:
