@@ -155,6 +155,10 @@ def test_an_effect_that_is_linear_in_name_only_is_refused(tmp_path, formula, lin
         ("(0.0, N_mine * ship.u)", "returns 2 numbers; a force gets ship.x"),
         ("(0.0, 0.0, N_mine * ship.north)", "no attribute 'north'; a force gets ship.x"),
         ("(0.0, N_mine * ship.v, N_mine)", "returns a force on Y, and is declared for N"),
+        (
+            "(0.0, 0.0, N_mine * ship.u + 3.0)",
+            "returns a force with N_mine = 0, where there is no effect",
+        ),
     ],
 )
 def test_a_function_that_gives_no_force_is_refused_with_one_line(tmp_path, given, message):

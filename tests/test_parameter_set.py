@@ -1,6 +1,7 @@
 """A model as a parameter set: written, read, run with, and baked into FMUs."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -178,6 +179,19 @@ def test_units_that_the_set_defines_are_converted(tmp_path):
         read_model(tmp_path / "b.ssv")
     with pytest.raises(Exception, match="is in 'deg', but the FMU's unit is 'kg'"):
         build(["vessel"], None, read_starts(tmp_path / "b.ssv"))
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (14.0, "'vessel.m' is 14.0, and no Parameter"),
+        (Parameter(float("nan"), "kg"), "'vessel.m' is nan"),
+    ],
+)
+def test_what_is_no_finite_parameter_is_not_written(tmp_path, value, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        write_parameters(tmp_path / "new" / "a.ssv", ParameterSet({"vessel": {"m": value}}))
+    assert not (tmp_path / "new").exists()
 
 
 def run(content, folder, *parameters):

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -185,6 +186,9 @@ def write_parameters(path: str | Path, content: ParameterSet) -> None:
     Args:
         path: the file, whose folder is made; an older one is replaced.
         content: its ``units`` must define every unit that a value states.
+
+    Raises:
+        InputError: a value is no :class:`Parameter`, or not finite; nothing is written.
     """
     ElementTree.register_namespace("ssv", SSV)
     ElementTree.register_namespace("ssc", SSC)
@@ -221,6 +225,12 @@ def _write_entries(parent: Element, entries: Mapping[str, Parameter]) -> None:
     """The element ``Parameters`` with these entries."""
     listed = SubElement(parent, f"{{{SSV}}}Parameters")
     for name, given in entries.items():
+        if not isinstance(given, Parameter):
+            raise InputError(
+                f"'{name}' is {given!r}, and no Parameter; write Parameter({given!r}, \"kg\")"
+            )
+        if not isfinite(given.value):
+            raise InputError(f"'{name}' is {given.value}; a parameter set holds finite numbers")
         entry = SubElement(listed, f"{{{SSV}}}Parameter", name=name)
         if given.description:
             entry.set("description", given.description)

@@ -183,7 +183,7 @@ def _running(sign: float) -> tuple[Thrust, Running]:
 
 
 def _check_force(e: Effect) -> None:
-    """Refuse a force that cannot be computed, or acts on an axis that is not declared.
+    """Refuse a force that cannot be computed, acts on another axis, or where its coefficients are zero.
 
     Raises:
         DeclarationError: with what the function gets and gives.
@@ -194,6 +194,7 @@ def _check_force(e: Effect) -> None:
     for sign in _SIGNS:
         try:
             found = _flat(e, (_motion(sign),), values)
+            none = _flat(e, (_motion(sign),), {})
         except (AttributeError, TypeError) as error:
             raise DeclarationError(f"'{e.id}': {error}; {form}") from None
         except (ValueError, ArithmeticError):  # it has no value there
@@ -205,6 +206,9 @@ def _check_force(e: Effect) -> None:
                 raise DeclarationError(
                     f"'{e.id}' returns a force on {axis}, and is declared for {e.axis}"
                 )
+        if any(none):
+            zero = " and ".join(f"{name} = 0" for name in e.coefficients)
+            raise DeclarationError(f"'{e.id}' returns a force with {zero}, where there is no effect")
 
 
 def is_linear(e: Effect) -> bool:
