@@ -23,6 +23,7 @@ from diagnosis.search.nonlinear.segmentation import (
     programmed_in,
     segmented,
     shares_of_rows,
+    sharpened,
 )
 from fmus.scale import REFERENCE
 
@@ -88,6 +89,8 @@ def test_change_points_are_found_between_cells(parts):
     found = segmented(p.weighted(np.full(3, 1e-3)))
     assert np.array(found) == pytest.approx(np.array(spans), abs=0.02)
     assert np.array(p.spans(p.values(found))) == pytest.approx(np.array(found), abs=1e-4)
+    whole = [(round(a), round(b)) for a, b in spans]
+    assert np.array(sharpened(p, whole)) == pytest.approx(np.array(spans), abs=0.1), "in any unit"
 
 
 def test_a_row_longer_than_a_cell_counts_in_each_by_its_time():

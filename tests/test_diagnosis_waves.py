@@ -65,6 +65,8 @@ def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure)
     assert (found is not None) == sure
     if found is not None:
         assert found.peak == pytest.approx(4.0, abs=0.3)
+        assert found.force == pytest.approx(0.1, rel=0.4)
+        assert 0.3 < found.share < 1.0
         assert found.confidence > 0.8
 
 
