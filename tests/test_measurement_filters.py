@@ -238,3 +238,17 @@ def test_a_position_that_is_late_is_no_low_pass():
     assert found["position_latency"].coefficients["position_latency"].value == pytest.approx(
         late, rel=0.05
     )
+
+
+@pytest.mark.parametrize("name", ["position_tracker", "heading_latency", "position_lag"])
+def test_what_a_filter_hides_is_known_up_to_the_ends_of_each_stretch(name):
+    """A rate that is unknown in the last row of a stretch would make a whole window unknown."""
+    s = smoothed(sail(40.0)[0])
+    lost = np.zeros(s.time.size, bool)
+    lost[150:190] = lost[-6:] = True
+    parts = {
+        n: np.where(lost[:, None], np.nan, getattr(s, n)) for n in ("eta", "eta_dot", "eta_ddot", "nu")
+    }
+    found = before_filters(replace(s, **parts), Model(measurement={name: 0.5}))
+    for part in found:
+        assert np.isfinite(part[~lost]).all()

@@ -168,6 +168,17 @@ def test_a_function_that_gives_no_force_is_refused_with_one_line(tmp_path, given
         STANDARD.plus_file(file)
 
 
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_an_effect_without_a_value_in_a_part_of_the_data_is_no_candidate(craft):
+    """Its loss would be no number, and with it the confidence of every effect."""
+    mine = craft(MOMENT.format(formula="(ship.u - 0.05) ** 0.5"))
+    w = windows()
+    model = Model(ship=mine)
+    found = {c.effect.id for c in candidates([w], model, model_error([w], model))}
+    assert "N_mine" not in found
+    assert "X_u" in found
+
+
 def test_every_effect_of_the_project_that_is_called_linear_is():
     assert all(is_linear(e) for e in STANDARD.values() if e.linear and e.function)
 

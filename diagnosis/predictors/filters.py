@@ -9,6 +9,7 @@ from scipy.linalg import get_lapack_funcs
 from fmus.ops import wrap
 
 from ..runs import Smoothed
+from ..runs.files.telegrams import groups_of
 
 
 class Filters(NamedTuple):
@@ -114,7 +115,7 @@ def _undone(f: Filters, s: Smoothed) -> BeforeFilters:
             rate = (T**2 * eta_ddot[:, k] - error) / tau
             eta[:, k] += error
             eta_dot[:, k] += rate
-            eta_ddot[:, k] += np.gradient(rate, s.time)
+            eta_ddot[:, k] += _derivative(rate, s.time)
     return BeforeFilters(eta + f.lag * eta_dot, eta_dot + f.lag * eta_ddot, eta, timely, timely_rate)
 
 
@@ -179,6 +180,15 @@ def _late(y: np.ndarray, off: Any, steps: float) -> np.ndarray:
     share = (at - before)[:, None, None]
     within = (1.0 - share) * y[before] + share * y[np.minimum(before + 1, len(y) - 1)]
     return np.where(at[:, None, None] < 0.0, y[0] + off * at[:, None, None] / steps, within)
+
+
+def _derivative(x: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Derivative (n,) of a signal over time, one-sided at the ends of each stretch that is known."""
+    found = np.full(x.size, np.nan)
+    for first, last in groups_of(np.isfinite(x)):
+        part = slice(first, last)
+        found[part] = np.gradient(x[part], time[part]) if last - first > 1 else 0.0
+    return found
 
 
 def _low_passed(time: np.ndarray, x: np.ndarray, T: float) -> np.ndarray:

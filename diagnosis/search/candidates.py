@@ -52,6 +52,12 @@ class CandidateShape:
     precision: np.ndarray | None = None
     removed_noise: np.ndarray | None = None
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether it can be computed: a function may have no value in a part of the data."""
+        given = () if self.offset is None else self.offset
+        return bool(np.isfinite(self.columns).all() and np.isfinite(given).all())
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -286,10 +292,11 @@ def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Ef
         own = [of_run(n, w.run.name) for w in data for n in e.fitted]
         shapes.append(shape(data, model, base, {}, own, step))
     if spread(e):
-        return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
-    for values in values_to_try(data, model, base, e):
-        shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
-    return Candidate(e, shapes)
+        shapes += by_starts(data, model, base, e, step)
+    else:
+        tries = (additions(model, e, values) for values in values_to_try(data, model, base, e))
+        shapes += [shape(data, model, base, given, e.fitted, step) for given in tries]
+    return Candidate(e, [s for s in shapes if s.is_finite])
 
 
 def lasts(e: Effect, model: Model) -> bool:
