@@ -89,11 +89,11 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     around = float(np.ptp(BAND)) / time
     level, found = peak(frequency, power, floor, band, around)
     count = segments.shape[-1]
-    least, at = PEAK + FEW / count, float(frequency[found.row])
-    commands = [x for part in parts for x in part[3]]
-    errors = [x[:, found.axis] for x in left]
+    least = PEAK + FEW / count
     if found.height < least:
         return None
+    at, errors = float(frequency[found.row]), [x[:, found.axis] for x in left]
+    commands = [x for part in parts for x in part[3]]
     # Commands that change less than twice in a period answer no waves: what follows them is not waves.
     held = all(changes_per_second(s.track.run) < 2.0 * at for s in runs)
     if held and follows_commands(errors, commands, BRIEF * time, at, float(frequency[1])):
@@ -125,7 +125,7 @@ def command_interval(run: Run) -> float:
 
     It is zero where most samples have commands of their own, or commands change at no regular times.
     """
-    between = np.diff(run.time[1:][(np.diff(run.given, axis=0) != 0.0).any(axis=1)])
+    between = np.diff(run.time[1:][_changes(run)])
     sample = float(np.median(np.diff(run.time)))
     if not between.size or (usual := float(np.median(between))) < 1.5 * sample:
         return 0.0
@@ -220,12 +220,9 @@ def constancy(signals: Sequence[np.ndarray], step: float, near: float) -> float:
         step: between samples [s].
         near: the frequency [Hz].
     """
-    from scipy.signal import detrend
-
     at_best = total = 0.0
     for x in signals:
-        frequency, spectrum = np.fft.fftfreq(2 * x.size, step), np.fft.fft(detrend(x), 2 * x.size)
-        z = np.fft.ifft(np.where(np.abs(frequency - near) < near / 4.0, spectrum, 0.0))[: x.size]
+        z = _analytic(x, step, near, near / 4.0)
         fine, twice = np.abs(np.fft.fft(z * z, 8 * x.size)), np.fft.fftfreq(8 * x.size, step)
         at_best += fine[np.abs(twice - 2.0 * near) < near / 2.0].max(initial=0.0)
         total += float((np.abs(z) ** 2).sum())
@@ -234,8 +231,12 @@ def constancy(signals: Sequence[np.ndarray], step: float, near: float) -> float:
 
 def changes_per_second(run: Run) -> float:
     """How often commands of a run change [1/s]."""
-    changes = (np.diff(run.given, axis=0) != 0.0).any(axis=1)
-    return float(changes.sum() / (run.time[-1] - run.time[0]))
+    return float(_changes(run).sum() / (run.time[-1] - run.time[0]))
+
+
+def _changes(run: Run) -> np.ndarray:
+    """(n - 1,), whether any command differs from that of the row before."""
+    return (np.diff(run.given, axis=0) != 0.0).any(axis=1)
 
 
 def follows_commands(
@@ -250,18 +251,21 @@ def follows_commands(
         step: between samples [s].
         at, row: frequency of the oscillation, and the distance to the next one [Hz].
     """
-    from scipy.signal import detrend
-
-    def around(x: np.ndarray) -> np.ndarray:
-        """Analytic signals (n, k) within two rows of the frequency."""
-        frequency = np.fft.fftfreq(2 * len(x), step)
-        spectrum = np.fft.fft(detrend(x, axis=0), 2 * len(x), axis=0)
-        return np.fft.ifft(np.where(np.abs(frequency - at) < 2.0 * row, spectrum.T, 0.0)).T[: len(x)]
-
-    y = np.concatenate([around(x[:, None]) for x in signals])
-    given = np.concatenate([around(x) for x in commands])
+    y, given = (
+        np.concatenate([_analytic(x, step, at, 2.0 * row) for x in each]) for each in (signals, commands)
+    )
     left = y - given @ np.linalg.lstsq(given, y, rcond=None)[0]
     return 2.0 * float(np.sum(np.abs(left) ** 2)) < float(np.sum(np.abs(y) ** 2))
+
+
+def _analytic(x: np.ndarray, step: float, at: float, width: float) -> np.ndarray:
+    """Analytic signals of signals (n, ...) within a width of a frequency [Hz]; step between rows [s]."""
+    from scipy.signal import detrend
+
+    size = len(x)
+    spectrum = np.fft.fft(detrend(x, axis=0), 2 * size, axis=0)
+    spectrum[np.abs(np.fft.fftfreq(2 * size, step) - at) >= width] = 0.0
+    return np.fft.ifft(spectrum, axis=0)[:size]
 
 
 def segments_above(segments: np.ndarray, found: Peak, level: np.ndarray) -> int:
