@@ -206,11 +206,10 @@ class SegmentationProblem:
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
         points = sum(1 + (b < self.section(a).end) for a, b in spans)
-        whole_cells = [(int(a), int(b)) for a, b in spans]
-        if whole_cells == spans:
-            (along, whole), given = self._whole, self._sums.linear(whole_cells)
+        if (cells := whole_cells(spans)) == spans:
+            (along, whole), given = self._whole, self._sums.linear(cells)
             along = along - given[:-1]
-            square = whole - 2.0 * given[-1] + self._sums.square(whole_cells)
+            square = whole - 2.0 * given[-1] + self._sums.square(cells)
         else:
             left = self.left(spans)
             along, square = self.nuisance.T @ left, left @ left
@@ -222,9 +221,14 @@ class SegmentationProblem:
         return cost - float(2.0 * b @ along - b @ self._gram @ b - last @ self.precision @ last)
 
 
+def whole_cells(spans: Spans) -> list[tuple[int, int]]:
+    """The intervals with change points at the nearest ends of cells."""
+    return [(round(a), round(b)) for a, b in spans]
+
+
 def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
     """The intervals of least cost, from those of a start or from none."""
-    best = moved(p, [(round(a), round(b)) for a, b in start or []])
+    best = moved(p, [*whole_cells(start or [])])
     least = p.cost(best)
     whole = np.asarray(p.columns.sum(axis=1)).ravel()
     for _ in range(STEPS):
@@ -292,7 +296,7 @@ def intervals(p: SegmentationProblem) -> Spans:
         left = p.fitted(p.left(spans)).reshape(-1, 3)
         sigma = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
         before, spans = spans, segmented(p.weighted(sigma), spans)
-        if spans == before:
+        if whole_cells(spans) == whole_cells(before):
             break
     return spans
 
